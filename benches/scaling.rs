@@ -173,7 +173,7 @@ fn main() {
     }
     println!("\nparts of an iteration, nanoseconds per element");
     print!("{:<8} {:<9} {:>8}", "stage", "rotations", "elements");
-    ["tangent", "force", "foresight", "factorise", "solve", "residual", "judge"]
+    ["tangent", "force", "predictor", "factorise", "solve", "residual", "judge"]
         .iter()
         .for_each(|name| print!(" {name:>9}"));
     println!();

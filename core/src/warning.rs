@@ -50,6 +50,13 @@ macro_rules! warning_kinds {
                 }
             }
 
+            /// The meaning of the warning, a sentence.
+            pub fn meaning(self) -> &'static str {
+                match self {
+                    $(Self::$kind => concat!($($meaning),+).trim_start(),)+
+                }
+            }
+
             /// The subject of the warning.
             pub fn about(self) -> About {
                 match self {

@@ -3,7 +3,7 @@
 
     python3 docs/pictures/draw.py target/release/beamsim
 
-report.png is a screenshot of the report of arm.toml, by a headless browser where one is installed (chromium).
+report.png and report-phone.png are screenshots of the report of arm.toml, by a headless browser where one is installed (chromium).
 """
 
 import csv
@@ -97,8 +97,10 @@ def arm(folder, deck):
     if browser:
         subprocess.run([BEAMSIM, "run", "arm.toml", "--report"], cwd=folder, check=True, capture_output=True)
         page = f"file://{folder}/results/arm/report.html"
-        command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--virtual-time-budget=4000", "--window-size=1280,740"]
-        subprocess.run([*command, f"--screenshot={HERE / 'report.png'}", page], check=True, capture_output=True)
+        command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--virtual-time-budget=4000"]
+        dark = "--blink-settings=preferredColorScheme=0"
+        for name, options in [("report", ["--window-size=1280,740"]), ("report-phone", ["--window-size=390,844", dark])]:
+            subprocess.run([*command, *options, f"--screenshot={HERE / name}.png", page], check=True, capture_output=True)
 
 
 def main():

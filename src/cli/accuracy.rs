@@ -25,15 +25,15 @@ const JOURNAL: &str = "accuracy.journal";
 /// Arguments of `beamsim run` besides the decks.
 #[derive(clap::Args)]
 pub struct RunArguments {
-    /// Choose elements and steps so that the estimated error of all outputs is below ERROR,
-    /// relative to the largest value of each kind
+    /// Choose elements and steps so that the estimated error of each output is below ERROR, relative
+    /// to the largest displacement, rotation, … of the run: 1e-3
     #[arg(long, value_name = "ERROR")]
     accuracy: Option<f64>,
-    /// Time limit of this search: 90s, 5m, 1h
+    /// Time limit of the search for this accuracy: 90s, 5m, 1h
     #[arg(long, value_parser = console::duration, value_name = "TIME")]
     budget: Option<Duration>,
-    /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two more runs
-    /// with other elements and steps
+    /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two more runs:
+    /// half the elements, half the step
     #[arg(long)]
     error_bars: bool,
     /// Largest number of threads (default: one per core), for a search and for large scenes;

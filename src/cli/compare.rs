@@ -24,7 +24,7 @@ fn print_comparison(a: &Path, b: &Path, rtol: f64, atol: f64) -> Result<(), Comm
     }
     let read = |path: &Path| HistoryReader::read(&HistoryReader::of_results(path)?.unwrap_or_else(|| path.into()));
     let (history, stored) = (read(a)?, read(b)?);
-    let ComparedHistories { columns: table, extra } =
+    let ComparedHistories { columns: table, extra, nan } =
         study::compare(&history, &stored, rtol, atol).map_err(|error| CommandError::Unexpected(error.to_string()))?;
     json::compare(a, b, &table);
     let width = table.iter().map(|c| c.column.chars().count()).max().unwrap_or(0);
@@ -42,6 +42,9 @@ fn print_comparison(a: &Path, b: &Path, rtol: f64, atol: f64) -> Result<(), Comm
     }
     if !extra.is_empty() {
         console::line(&format!("only in {} (not compared): {}", a.display(), extra.join(", ")));
+    }
+    if !nan.is_empty() {
+        console::line(&format!("NaN in both histories, which counts as equal: {}", nan.join(", ")));
     }
     let beyond = table.iter().filter(|cell| cell.ratio > 1.0).count();
     if beyond > 0 {

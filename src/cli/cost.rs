@@ -28,11 +28,11 @@ const PRINTED_IMPROVEMENT: f64 = 0.9;
 #[derive(clap::Args)]
 pub struct CostArguments {
     /// Values to try, as in [cost]: order=1,2 elements=1,2,4 interpolation=relative
-    /// scheme=newmark,hht step=1,0.5
+    /// scheme=newmark,hht step=1,0.5 (multiples of the deck's step)
     #[arg(long, value_name = "KEY=V1,V2,…")]
     vary: Vec<String>,
-    /// The accuracy for which lines of the deck are printed
-    #[arg(long, default_value_t = 1e-3)]
+    /// Print the lines of the deck that reach this error at the lowest cost
+    #[arg(long, value_name = "ERROR", default_value = "1e-3")]
     accuracy: f64,
     /// Start no run after this time: 90s, 5m, 1h. Skipped runs are listed; run the command again to
     /// finish them
@@ -293,6 +293,7 @@ fn plot(title: &str, found: &CostStudy) -> String {
         style: LineStyle::Background,
     };
     let of_families = families.iter().enumerate().map(|(number, family)| family_line(found, family, number));
+    let of_families = of_families.filter(|line| !line.points.is_empty());
     let outputs = match &found.outputs[..] {
         [one] => found.columns[*one].clone(),
         several => format!("{} outputs", several.len()),

@@ -2,34 +2,41 @@
 
 use super::console;
 use super::status::Status;
-use crate::deck::{self, Entry};
+use crate::deck::{self, Entry, Hint};
+use crate::output::Units;
+use beamsim_core::probe::{COLUMNS, ColumnGroup, ColumnPart, Source, find_part};
 
 /// Line width of explanations, in columns of the terminal.
 const WIDTH: usize = 96;
 
-/// Prints the description of a key or a table of the deck.
-pub fn explain(key: &str) -> Status {
-    match deck::explain(key) {
-        Ok(entries) => {
-            let texts: Vec<String> = entries.iter().map(describe).collect();
-            console::answer(&texts.join("\n\n"));
-            Status::Fine
-        }
-        Err(meant) => {
-            let help = match meant {
-                Some(meant) => format!("did you mean `{meant}`?"),
-                None => "keys and tables are listed by `beamsim explain deck`".into(),
-            };
-            console::error("usage", &format!("there is no key or table `{key}` in decks: {help}"));
-            Status::Wrong
-        }
+/// Prints the description of a key, a table or a word of the deck, or of a column of results.
+pub fn explain(name: &str) -> Status {
+    let mut texts: Vec<String> = deck::explain(name).iter().map(describe).collect();
+    // `tip.uz` is a column; `stage.load` is none.
+    let column = if texts.is_empty() { name.rsplit('.').next().unwrap_or(name) } else { name };
+    texts.extend(describe_columns(column.trim()));
+    if texts.is_empty() {
+        let columns: Vec<&str> = COLUMNS.iter().flat_map(ColumnGroup::suffixes).collect();
+        let help = match deck::similar(name, &columns) {
+            Hint::Use(meant) => format!("did you mean `{meant}`?"),
+            Hint::Near(meant) => format!("did you mean `{meant}`?"),
+            Hint::Text(help) => help.into(),
+            Hint::None => "tables are listed by `beamsim explain deck`, their keys by their names".into(),
+        };
+        console::error("usage", &format!("there is no key, word or column `{name}`: {help}"));
+        return Status::Wrong;
     }
+    console::answer(&texts.join("\n\n"));
+    Status::Fine
 }
 
 fn describe(entry: &Entry) -> String {
-    let key = entry.path.rsplit('.').next().unwrap_or(&entry.path);
     let needed = if entry.required { " (required)" } else { "" };
-    let mut lines = vec![format!("{key}, in {}{needed}", entry.table)];
+    let heading = match &entry.word {
+        Some(word) => format!("{word}, a value of `{}` in {}", entry.key(), entry.table),
+        None => format!("{}, in {}{needed}", entry.key(), entry.table),
+    };
+    let mut lines = vec![heading];
     lines.extend(broken(&entry.description, "  "));
     let mut facts = vec![entry.kinds.clone()];
     facts.extend(entry.unit.as_ref().map(|unit| format!("unit: {unit}")));
@@ -41,6 +48,49 @@ fn describe(entry: &Entry) -> String {
     }
     lines.extend(entry.examples.iter().map(|example| format!("    {example}")));
     lines.join("\n")
+}
+
+/// Descriptions of the columns of a group (`u`), or of one column (`uz`, `omega`).
+fn describe_columns(name: &str) -> Vec<String> {
+    let mut texts = Vec::new();
+    for group in &COLUMNS {
+        let is_whole = group.key == name;
+        for part in group.parts.iter().filter(|part| is_whole || part.suffixes.contains(&name)) {
+            texts.push(describe_part(group, part));
+        }
+    }
+    // Columns of modes and critical loads belong to no group.
+    match find_part(name) {
+        Some(part) if texts.is_empty() => {
+            vec![format!("{name}, a column of modes.csv\n  {}{}", part.title, unit(part))]
+        }
+        Some(_) | None => texts,
+    }
+}
+
+fn describe_part(group: &ColumnGroup, part: &ColumnPart) -> String {
+    let owner = match group.source {
+        Source::Place(_) => "a node or a place on a beam",
+        Source::Node(_) => "a node",
+        Source::BeamPoint(_) => "a place on a beam",
+        Source::Scene(_) => "the whole scene",
+        Source::Run(_) => "the run",
+    };
+    let before = if group.is_of_node() { "tip" } else { group.key };
+    let names: Vec<String> = part.suffixes.iter().map(|suffix| format!("{before}.{suffix}")).collect();
+    let names = if names.is_empty() { group.key.to_string() } else { names.join(", ") };
+    let how = match group.source {
+        Source::Run(_) => "in every history".to_string(),
+        Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) | Source::Scene(_) => {
+            format!("written by columns = [\"{}\"] in [output]", group.key)
+        }
+    };
+    format!("{names}: columns of {owner}\n  {}{}; {how}", part.title, unit(part))
+}
+
+/// The dimension of a column, such as `; unit: force·length`.
+fn unit(part: &ColumnPart) -> String {
+    Units::dimensions().of_part(part).map_or(String::new(), |unit| format!("; unit: {unit}"))
 }
 
 /// Lines that fit a terminal.

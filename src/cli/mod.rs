@@ -29,19 +29,21 @@ mod variant;
 mod verdict;
 mod verify;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use error::CommandError;
 use status::Status;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+const START: &str = "A deck is a text file that describes beams, supports, loads and stages. To begin:\n  beamsim new                     writes the deck cantilever.toml\n  beamsim run cantilever.toml     simulates it, and says where the results are";
 const AFTER_HELP: &str = "Exit status: 0 success; 1 an expectation or comparison failed; 2 the deck or the command line is \
                           wrong; 3 the simulation failed; 4 a file could not be read or written; 5 an accuracy was not reached; 129, \
                           130 or 143 interrupted.";
 
 /// Simulates slender parts with large deflections and rotations.
 #[derive(Parser)]
-#[command(version, about, after_help = AFTER_HELP)]
+#[command(version, about, after_help = format!("{START}\n\n{AFTER_HELP}"))]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -52,10 +54,11 @@ struct Arguments {
 /// Decks and changes to them.
 #[derive(clap::Args)]
 struct DeckArguments {
-    /// Decks (TOML)
+    /// Decks (TOML files)
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
-    /// Change a value of the deck: param.L=12, stage.0.step=0.01, section.leg.EA=2e6
+    /// Change a value of the deck; may be repeated: param.L=12, section.leg.EA=2e6, stage.0.step=0.01
+    /// (the first [[stage]])
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -81,7 +84,8 @@ enum Command {
         #[command(flatten)]
         input: DeckArguments,
     },
-    /// Run decks and compare the results with their [[expect]] tables
+    /// Run decks, or all decks in folders, and compare the results with the values in their [[expect]]
+    /// tables
     #[command(after_help = "Examples:\n  beamsim verify decks\n  beamsim verify arm.toml --out results")]
     Verify {
         #[command(flatten)]
@@ -90,21 +94,21 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
-    /// Compare a history with a stored one
+    /// Compare a history with a stored one, column by column
     #[command(after_help = "Example:\n  beamsim compare results/arm/history.csv stored.csv --rtol 1e-6")]
     Compare {
         /// History (CSV)
         a: PathBuf,
-        /// Stored history to compare with (CSV)
+        /// Stored history (CSV); its columns are compared
         b: PathBuf,
-        /// Allowed relative difference
-        #[arg(long, default_value_t = 1e-9)]
+        /// Allowed difference relative to the stored value
+        #[arg(long, default_value = "1e-9")]
         rtol: f64,
-        /// Allowed absolute difference
-        #[arg(long, default_value_t = 1e-12)]
+        /// Allowed absolute difference, added to the relative one
+        #[arg(long, default_value = "1e-12")]
         atol: f64,
     },
-    /// Find the cheapest elements, order and step for each accuracy, from many runs of a deck
+    /// Run a deck with many meshes and steps, and find the cheapest for each accuracy
     #[command(
         after_help = "Examples:\n  beamsim cost arm.toml --budget 60s\n  beamsim cost arm.toml --vary elements=1,2,4 --vary order=1,2,3"
     )]
@@ -125,7 +129,7 @@ enum Command {
         #[command(flatten)]
         wanted: plot::PlotArguments,
     },
-    /// Write a page that plays a run back, with its histories, energies, effects and deck
+    /// Write a page for a browser that plays a run back, with its histories, energies, effects and deck
     #[command(after_help = "Example:\n  beamsim report results/arm")]
     Report {
         /// Folders of results
@@ -135,20 +139,21 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
-    /// Switch each effect off in turn and show how results and time change
+    /// Leave out each effect (rotary inertia, shear, …) in turn and show how results and run time change
     #[command(after_help = "Example:\n  beamsim effects arm.toml --tolerance 1e-2")]
     Effects {
         #[command(flatten)]
         input: DeckArguments,
-        /// Effects are left out as long as no output changes by more than this, relative to the
-        /// largest value of its kind
-        #[arg(long, default_value_t = 1e-3)]
+        /// Largest change of the outputs by effects that count as negligible, relative to the largest
+        /// displacement, rotation, … of the run
+        #[arg(long, default_value = "1e-3")]
         tolerance: f64,
         /// Folder of the results (default: results/<deck name>)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
-    /// Run a deck with many values of its keys and write one table of results
+    /// Run a deck with many values of its keys (a point for each combination), and write one table of
+    /// results
     #[command(
         after_help = "Examples:\n  beamsim sweep arm.toml --vary section.rod.EI=50:200:4 --vary param.L=1,2\n  beamsim sweep arm.toml --vary param.L=1:3 --sample 200 --seed 7 --output tip.uz:absmax\n  beamsim sweep arm.toml --vary param.L=1:3:1000 --engine slurm --sbatch=--partition=short"
     )]
@@ -166,11 +171,14 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
-    /// Explain a key or a table of the deck
-    #[command(after_help = "Examples:\n  beamsim explain stage.scheme\n  beamsim explain deck")]
+    /// Explain a key, a table or a word of the deck, or a column of the results
+    #[command(
+        after_help = "Examples:\n  beamsim explain stage.scheme\n  beamsim explain cylindrical\n  beamsim explain tip.uz\n  beamsim explain deck"
+    )]
     Explain {
-        /// Key or table, such as elements, beam.elements or [[beam]]; `deck` lists all tables
-        key: String,
+        /// Key (elements, beam.elements), table ([[beam]]), word (cylindrical, limit_point) or column
+        /// (tip.uz); `deck` lists all tables
+        name: String,
     },
     /// Print the JSON Schema of the deck, for editors
     #[command(after_help = "Example:\n  beamsim schema > beamsim.schema.json")]
@@ -194,9 +202,9 @@ enum Command {
 /// Parses the command line and runs the command.
 pub fn main() -> ExitCode {
     signals::listen();
-    let arguments = match Arguments::try_parse() {
+    let arguments = match parse() {
         Ok(arguments) => arguments,
-        Err(error) => return ExitCode::from(usage(&error) as u8),
+        Err(error) => return ExitCode::from(usage(error) as u8),
     };
     console::configure(arguments.print_options);
     let status = match arguments.command {
@@ -212,12 +220,23 @@ pub fn main() -> ExitCode {
         }
         Command::Sweep { wanted } => sweep::sweep(&wanted),
         Command::New { template, out } => new::new(template, out.as_deref()),
-        Command::Explain { key } => explain::explain(&key),
+        Command::Explain { name } => explain::explain(&name),
         Command::Schema => schema::schema(),
         Command::Completions { shell } => completions::completions(shell, Arguments::command()),
         Command::Manual { out } => manual::manual(Arguments::command(), out.as_deref()),
     };
     ExitCode::from(with_warnings(status) as u8)
+}
+
+/// The command line. A negative number is the value of the option before it.
+fn parse() -> Result<Arguments, clap::Error> {
+    let command = Arguments::command().mut_subcommands(|subcommand| {
+        subcommand.mut_args(|argument| {
+            let is_option = !argument.is_positional() && argument.get_action().takes_values();
+            if is_option { argument.allow_negative_numbers(true) } else { argument }
+        })
+    });
+    Arguments::from_arg_matches(&command.try_get_matches()?)
 }
 
 /// The exit status with `--deny-warnings`: a success with warnings becomes a failure.
@@ -233,14 +252,16 @@ fn with_warnings(status: Status) -> Status {
 
 /// Prints help and version, which clap returns as errors too; everything else is a wrong command
 /// line.
-fn usage(error: &clap::Error) -> Status {
-    let text = error.render();
+fn usage(mut error: clap::Error) -> Status {
+    if error.kind() == ErrorKind::UnknownArgument {
+        advise(&mut error);
+    }
+    let text = error.render().to_string();
     if error.exit_code() == 0 {
-        console::answer(text.to_string().trim_end());
+        console::answer(text.trim_end());
         return Status::Fine;
     }
-    let text = text.to_string();
-    if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         console::note(text.trim_end());
         console::error("usage", "a command is needed");
         return Status::Wrong;
@@ -251,4 +272,17 @@ fn usage(error: &clap::Error) -> Status {
     }
     console::error("usage", first.trim_start_matches("error: "));
     Status::Wrong
+}
+
+/// Replaces the advice to write `-- -5s`, which would make a deck of a value that begins with `-`.
+fn advise(error: &mut clap::Error) {
+    let Some(ContextValue::StyledStrs(mut tips)) = error.remove(ContextKind::Suggested) else { return };
+    tips.retain(|tip| !tip.to_string().starts_with("to pass "));
+    let argument = error.get(ContextKind::InvalidArg).map_or(String::new(), ToString::to_string);
+    if argument.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.')) {
+        tips.push("join a value that begins with `-` to its option by `=`, such as --option=-1e-3".into());
+    }
+    if !tips.is_empty() {
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));
+    }
 }

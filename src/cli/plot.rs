@@ -13,6 +13,8 @@ use std::path::{Path, PathBuf};
 
 /// Largest number of columns that are drawn without `--column`.
 const MAX_DEFAULT_COLUMNS: usize = 6;
+/// Largest number of columns that a message names.
+const MAX_NAMED_COLUMNS: usize = 8;
 /// Smallest change of a displacement relative to the largest one; smaller changes are round-off.
 const MIN_CHANGE: f64 = 1e-9;
 
@@ -22,11 +24,12 @@ pub struct PlotArguments {
     /// Folders of results, or histories (CSV); several are drawn on the same axes
     #[arg(required = true, value_name = "RESULTS")]
     results: Vec<PathBuf>,
-    /// A column, such as tip.ux (default: displacements that change)
+    /// A column, such as tip.ux; may be repeated (default: the first six displacements that change;
+    /// without displacements, the first six columns)
     #[arg(long = "column", value_name = "COLUMN")]
     columns: Vec<String>,
-    /// The column of the horizontal axis (default: time; if all stages are static, the load factor,
-    /// stage by stage)
+    /// The column of the horizontal axis (default: time; if no stage is dynamic, the load factor,
+    /// one stage after another)
     #[arg(long, value_name = "COLUMN")]
     x: Option<String>,
     /// A stored history (CSV) to compare with
@@ -46,7 +49,18 @@ struct NamedHistory {
     history: HistoryReader,
     /// The record of the run, if run.json is beside the history
     record: Option<Record>,
+    /// How the run ended, if it did not finish
+    failure: Option<String>,
     is_reference: bool,
+}
+
+/// Columns that are drawn without `--column`.
+struct DefaultColumns {
+    names: Vec<String>,
+    /// The rule that chose them, as a message
+    rule: String,
+    /// Columns of the history that the plot does not show
+    omitted: Vec<String>,
 }
 
 /// The quantity of the horizontal axis.
@@ -70,6 +84,7 @@ fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
     let mut runs = wanted.results.iter().map(|path| read(path, false)).collect::<Result<Vec<_>, _>>()?;
     runs.extend(wanted.reference.as_ref().map(|path| read(path, true)).transpose()?);
     tell_apart(&mut runs);
+    runs.iter().filter_map(NamedHistory::warning).for_each(|warning| console::note(&warning));
     let columns = columns(wanted, &runs[0].history)?;
     let abscissa = match &wanted.x {
         Some(name) => find(&runs[0].history, name).map(|_| Abscissa::Column(name.clone()))?,
@@ -88,8 +103,8 @@ fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
             // One column needs no name on each line, and its runs differ by colour.
             let (name, colour, dash) = match (runs.len(), columns.len()) {
                 (1, _) => (of_column, place, 0),
-                (_, 1) => (run.name.clone(), number, number),
-                _ => (format!("{}: {of_column}", run.name), place, number),
+                (_, 1) => (run.legend(), number, number),
+                _ => (format!("{}: {of_column}", run.legend()), place, number),
             };
             let (points, bars) = points(run, &abscissa, column)?;
             lines.push(Line { name, points, bars, beside: Vec::new(), style: LineStyle::Dashed { colour, dash } });
@@ -111,13 +126,15 @@ fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// The title of the deck if one run is drawn, else the names of the runs.
+/// The title of the deck if all runs share it, else the names of the runs.
 fn title(runs: &[NamedHistory]) -> String {
     let drawn: Vec<&NamedHistory> = runs.iter().filter(|run| !run.is_reference).collect();
-    let names: Vec<&str> = drawn.iter().map(|run| run.name.as_str()).collect();
+    let of_deck = |run: &&NamedHistory| run.record.as_ref().and_then(Record::title).map(str::to_string);
+    let common =
+        drawn.first().and_then(of_deck).filter(|title| drawn.iter().all(|run| of_deck(run).as_ref() == Some(title)));
     match &drawn[..] {
-        [run] => run.record.as_ref().and_then(Record::title).unwrap_or(&run.name).into(),
-        _ => names.join(", "),
+        [run] => common.unwrap_or(run.name.clone()) + &run.remark(),
+        _ => common.unwrap_or_else(|| drawn.iter().map(|run| run.name.as_str()).collect::<Vec<_>>().join(", ")),
     }
 }
 
@@ -231,7 +248,14 @@ fn read(path: &Path, is_reference: bool) -> Result<NamedHistory, CommandError> {
     // `results/arm/history.csv` is `arm`.
     let name = folder.as_deref().map_or_else(|| load::without_extension(&file, ".csv"), load::folder_name);
     let record = folder.and_then(|folder| Record::read(&folder).ok());
-    Ok(NamedHistory { name, path: path.into(), history, record, is_reference })
+    let is_partial = file.file_name().is_some_and(|name| name == "history.partial.csv");
+    let failure = record.as_ref().and_then(Record::failure).or(is_partial.then_some("unknown")).map(str::to_string);
+    if history.rows.is_empty() {
+        let reason =
+            failure.map_or(String::new(), |failure| format!(": the run failed before its first state ({failure})"));
+        return Err(CommandError::Usage(format!("{} has no rows{reason}", file.display())));
+    }
+    Ok(NamedHistory { name, path: path.into(), history, record, failure, is_reference })
 }
 
 /// Renames runs that share a name: they are named by their paths.
@@ -252,6 +276,22 @@ impl NamedHistory {
         Ok(self.history.rows.iter().map(|row| row[place]).collect())
     }
 
+    /// A remark for titles, if the run did not finish.
+    fn remark(&self) -> String {
+        self.failure.as_ref().map_or(String::new(), |failure| format!(" (did not finish: {failure})"))
+    }
+
+    /// The name of the run in the legend.
+    fn legend(&self) -> String {
+        self.name.clone() + &self.remark()
+    }
+
+    /// The warning that the history is incomplete, if it is.
+    fn warning(&self) -> Option<String> {
+        let failure = self.failure.as_ref()?;
+        Some(format!("warning: {}: the run did not finish ({failure}); its history ends there", self.path.display()))
+    }
+
     /// True if the values of a column differ.
     fn varies(&self, name: &str) -> bool {
         self.column(name).is_ok_and(|values| values.iter().any(|value| *value != values[0]))
@@ -269,27 +309,48 @@ fn find(history: &HistoryReader, name: &str) -> Result<usize, CommandError> {
     })
 }
 
-/// The columns that the user names; else the displacements that change, or all displacements, or all
-/// columns.
+/// The columns that the user names, or the default ones with a line about those that are left out.
 fn columns(wanted: &PlotArguments, history: &HistoryReader) -> Result<Vec<String>, CommandError> {
     if !wanted.columns.is_empty() {
         return wanted.columns.iter().map(|name| find(history, name).map(|_| name.clone())).collect();
     }
-    let shown = |name: &&String| {
-        clocks().all(|clock| clock != name.as_str()) && !name.ends_with(".err") && Some(*name) != wanted.x.as_ref()
-    };
-    let moved = |name: &&String| quantity(name) == Some(Quantity::Displacement);
-    let all: Vec<String> = history.names.iter().filter(shown).cloned().collect();
-    let displacements: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
+    let DefaultColumns { names, rule, omitted } = default_columns(history, wanted.x.as_ref());
+    if names.is_empty() {
+        return Err(CommandError::Usage("the history has no columns to plot".into()));
+    }
+    if !omitted.is_empty() {
+        let named = omitted.iter().take(MAX_NAMED_COLUMNS).cloned().collect::<Vec<_>>().join(", ");
+        let more = omitted.len().saturating_sub(MAX_NAMED_COLUMNS);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        console::line(&format!("drawn: {rule}; not drawn: {named}{more}; choose columns by --column"));
+    }
+    Ok(names)
+}
+
+/// The displacements that change, or all displacements, or all columns; not more than
+/// [`MAX_DEFAULT_COLUMNS`].
+fn default_columns(history: &HistoryReader, x: Option<&String>) -> DefaultColumns {
+    let is_shown =
+        |name: &&String| clocks().all(|clock| clock != name.as_str()) && !name.ends_with(".err") && Some(*name) != x;
+    let is_displacement = |name: &&String| quantity(name) == Some(Quantity::Displacement);
+    let all: Vec<String> = history.names.iter().filter(is_shown).cloned().collect();
+    let displacements: Vec<String> = all.iter().filter(is_displacement).cloned().collect();
     let changes: Vec<f64> = displacements.iter().map(|name| change(history, name)).collect();
     let largest = changes.iter().copied().fold(0.0, f64::max);
     let changing = displacements.iter().zip(&changes).filter(|(_, change)| **change > MIN_CHANGE * largest);
-    let candidates = [changing.map(|(name, _)| name.clone()).collect(), displacements, all];
-    let usual = candidates.into_iter().find(|names: &Vec<String>| !names.is_empty()).unwrap_or_default();
-    if usual.is_empty() {
-        return Err(CommandError::Usage("the history has no columns to plot".into()));
-    }
-    Ok(usual.into_iter().take(MAX_DEFAULT_COLUMNS).collect())
+    let changing: Vec<String> = changing.map(|(name, _)| name.clone()).collect();
+    let (candidates, kind) = if !changing.is_empty() {
+        (changing, "displacements that change")
+    } else if !displacements.is_empty() {
+        (displacements, "displacements")
+    } else {
+        (all.clone(), "columns (there are no displacements)")
+    };
+    let count = candidates.len();
+    let names: Vec<String> = candidates.into_iter().take(MAX_DEFAULT_COLUMNS).collect();
+    let rule = if count > names.len() { format!("the first {} of {count} {kind}", names.len()) } else { kind.into() };
+    let omitted = all.into_iter().filter(|name| !names.contains(name)).collect();
+    DefaultColumns { names, rule, omitted }
 }
 
 /// The difference of the largest and the smallest value of a column.

@@ -69,6 +69,8 @@ pub(super) const KEYS: [&str; 11] =
     ["kind", "at", "beams", "nodes", "axis", "axes", "stiffness", "damping", "angle", "displacement", "history"];
 /// Keys of springs, dampers and motors, which act on the one free direction of a joint.
 const DRIVE: [&str; 5] = ["stiffness", "damping", "angle", "displacement", "history"];
+/// Remedy for joints that slide and turn.
+const SERIES: &str = "; put one of each in series, with a body between them, or use [[spring]]";
 /// Largest cosine between the axes of a universal joint.
 const NORMAL: f64 = 1e-9;
 
@@ -99,10 +101,13 @@ fn refuse_drive_of_others(table: &Table, kind: JointKind) {
     for key in DRIVE.into_iter().filter(|key| table.has(key) && !own.is_some_and(|own| own.contains(key))) {
         let help = match kind.driven {
             Some(coordinate) => format!("its motor is given by `{}`", coordinate.word()),
-            None => format!(
-                "springs, dampers and motors are only allowed in joints with one free coordinate: {}",
-                one_of(driven_kinds())
-            ),
+            None => {
+                let one = one_of(driven_kinds());
+                let remedy = if kind.shares_displacement() { "" } else { SERIES };
+                format!(
+                    "springs, dampers and motors are only allowed in joints with one free coordinate: {one}{remedy}"
+                )
+            }
         };
         let message = format!("`{key}` is not allowed in a {} joint", kind.word);
         table.context.report(Diagnostic::error(message, table.key_span(key)).help(help));

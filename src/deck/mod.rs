@@ -48,7 +48,7 @@ pub use diagnostic::{Diagnostic, Severity, Span, Spanned, one_of};
 pub use effects::{EffectWord, Effects};
 pub use expect::{Expect, ExpectBody, Instant, Reduce, Reduction, Target};
 pub use expression::{Expression, Jet};
-pub use hints::{hint, nearest};
+pub use hints::{Hint, hint, nearest};
 pub use history::{HistoryBody, HistoryTable, HistoryUse};
 pub use import::import;
 pub use initial::{Initial, InitialTarget};
@@ -61,7 +61,7 @@ pub use output::Output;
 pub use overrides::apply;
 pub use parameters::Parameters;
 pub use point::PointRef;
-pub use schema::{Entry, SCHEMA, entries, explain};
+pub use schema::{Entry, SCHEMA, entries, explain, similar};
 pub use scheme::{SchemeName, SchemeWord};
 pub use section::{Section, SectionBody, Shape};
 pub use spring::{Spring, SpringBody};
@@ -199,7 +199,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         broken,
         stage_count: 0,
         title: top.text("title").map(|t| t.value),
-        gravity: top.vector("gravity"),
+        gravity: read_gravity(&top),
         points,
         materials,
         sections,
@@ -236,6 +236,21 @@ fn defined_names(document: &DeTable) -> Vec<String> {
         names.extend(beams.iter().filter_map(name));
     }
     names
+}
+
+/// `gravity`, which is a key, although other programs have a table.
+fn read_gravity(top: &Table) -> Option<Spanned<[f64; 3]>> {
+    let is_table = match top.get("gravity")?.get_ref() {
+        DeValue::Table(_) => true,
+        DeValue::Array(entries) => entries.iter().any(|entry| matches!(entry.get_ref(), DeValue::Table(_))),
+        _ => false,
+    };
+    if is_table {
+        let diagnostic = Diagnostic::error("`gravity` is a key, not a table", top.key_span("gravity"));
+        top.context.report(diagnostic.help("write gravity = [0, 0, -9.81] above the first table"));
+        return None;
+    }
+    top.vector("gravity")
 }
 
 /// Reads `[[key]]` tables.

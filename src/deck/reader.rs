@@ -210,7 +210,13 @@ impl<'a> Table<'a> {
     pub fn of_names(context: &'a Context, item: &'a Item<'a>, what: impl Into<String>) -> Option<Self> {
         let what = what.into();
         let DeValue::Table(entries) = item.get_ref() else {
-            return context.wrong(item.span(), format!("{what} must be a table, found {}", kind_of(item.get_ref())));
+            let message = format!("{what} must be a table, found {}", kind_of(item.get_ref()));
+            let mut diagnostic = Diagnostic::error(message, item.span());
+            if matches!(item.get_ref(), DeValue::Array(_)) && what.starts_with('[') && !what.starts_with("[[") {
+                diagnostic = diagnostic.help(format!("write {what} in single brackets: there is one of it"));
+            }
+            context.report(diagnostic);
+            return None;
         };
         Some(Self { context, what, span: item.span(), entries, misspelt: Vec::new() })
     }

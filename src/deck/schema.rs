@@ -1,22 +1,27 @@
-//! Descriptions of keys: the JSON Schema of the deck is their one source.
+//! Descriptions of keys and words: the JSON Schema of the deck is their one source.
 
-use super::hints::{nearest, synonymous_key};
+use super::hints::{self, Hint};
+use beamsim_core::warning::WarningKind;
 use serde_json::Value;
 
 /// The JSON Schema (draft 7).
 pub const SCHEMA: &str = include_str!("schema.json");
 
-/// A key, or a table, of the deck.
+/// A key, a table, or a word that is the value of a key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// `beam.elements`
+    /// Path of the key: `beam.elements`
     pub path: String,
+    /// The word, in the entry of a word
+    pub word: Option<String>,
     /// Its table: `[[beam]]`, `the deck`
     pub table: String,
     /// Meaning
     pub description: String,
     /// Kinds of values, or words
     pub kinds: String,
+    /// Words that are values of the key
+    pub words: Vec<String>,
     /// Unit, if it has one
     pub unit: Option<String>,
     /// Default, as TOML
@@ -29,26 +34,29 @@ pub struct Entry {
     pub required: bool,
 }
 
-/// Entries of a word: a key (`elements`, in all tables that have it), `beam.elements`, or a table
-/// (`[[beam]]`, `beam`). `Err` with the nearest known word.
-pub fn explain(word: &str) -> Result<Vec<Entry>, Option<String>> {
-    let path = word.trim().trim_matches(['[', ']']).replace(".NAME", "");
+/// Entries of a key (`elements`, in all tables that have it, or `beam.elements`), of a table
+/// (`[[beam]]`, `beam`), and of a word that is a value of keys (`cylindrical`).
+pub fn explain(name: &str) -> Vec<Entry> {
+    let path = name.trim().trim_matches(['[', ']', '"']).replace(".NAME", "");
     let all = entries();
-    if path == "deck" {
-        return Ok(vec![whole()]);
-    }
-    let exact: Vec<Entry> = all.iter().filter(|entry| entry.path == path).cloned().collect();
-    if !exact.is_empty() {
-        return Ok(exact);
-    }
     let below = format!(".{path}");
-    let found: Vec<Entry> = all.iter().filter(|entry| entry.path.ends_with(&below)).cloned().collect();
-    if !found.is_empty() {
-        return Ok(found);
+    let mut found: Vec<Entry> =
+        if path == "deck" { vec![whole()] } else { all.iter().filter(|entry| entry.path == path).cloned().collect() };
+    if found.is_empty() {
+        found = all.iter().filter(|entry| entry.path.ends_with(&below)).cloned().collect();
     }
+    found.extend(all.iter().filter_map(|entry| entry.of_word(&path)));
+    found
+}
+
+/// Help for a name that is neither in the deck nor among other known names.
+pub fn similar(name: &str, others: &[&str]) -> Hint {
+    let all = entries();
     let keys = all.iter().filter_map(|entry| entry.path.rsplit('.').next());
-    let known: Vec<&str> = all.iter().map(|entry| entry.path.as_str()).chain(keys).collect();
-    Err(synonymous_key(&path, &known).or_else(|| nearest(&path, known)).map(str::to_string))
+    let paths = all.iter().map(|entry| entry.path.as_str());
+    let words = all.iter().flat_map(|entry| entry.words.iter().map(String::as_str));
+    let known: Vec<&str> = paths.chain(keys).chain(words).chain(others.iter().copied()).collect();
+    hints::for_any(name, &known)
 }
 
 /// The deck itself, whose keys are its tables.
@@ -102,15 +110,75 @@ fn entry(node: &Value, inner: &Value, path: &str, table: &str, required: bool) -
     let name = path.rsplit('.').next().unwrap_or(path);
     Entry {
         path: path.into(),
+        word: None,
         table: table.into(),
         description: description.trim().into(),
         kinds: kinds(node),
+        words: words(node),
         unit: text(node, "x-unit").filter(|unit| unit != "none"),
         default: node.get("default").map(to_toml),
         examples: examples.iter().map(|example| format!("{name} = {}", to_toml(example))).collect(),
         keys: inner["properties"].as_object().map_or(Vec::new(), |keys| keys.keys().cloned().collect()),
         required,
     }
+}
+
+impl Entry {
+    /// The key, without its table.
+    pub fn key(&self) -> &str {
+        self.path.rsplit('.').next().unwrap_or(&self.path)
+    }
+
+    /// The entry of a word that is a value of this key.
+    fn of_word(&self, word: &str) -> Option<Self> {
+        if !self.words.iter().any(|known| known == word) {
+            return None;
+        }
+        let quoted = format!("\"{word}\"");
+        let value = if self.kinds == "list" { format!("[{quoted}]") } else { quoted.clone() };
+        let warning = WarningKind::of(word).filter(|_| self.path == "expect.warns");
+        Some(Self {
+            word: Some(word.into()),
+            description: warning.map_or_else(|| self.clause(word), describe_warning),
+            kinds: String::new(),
+            words: Vec::new(),
+            unit: None,
+            default: self.default.clone().filter(|default| *default == quoted),
+            examples: vec![format!("{} = {value}", self.key())],
+            keys: Vec::new(),
+            required: false,
+            ..self.clone()
+        })
+    }
+
+    /// The part of the description that is about a word (`word`: …), else all of it.
+    fn clause(&self, word: &str) -> String {
+        let begin = |word: &str| self.description.find(&format!("`{word}`: "));
+        let Some(start) = begin(word) else { return self.description.clone() };
+        let ends = self.words.iter().filter_map(|other| begin(other)).filter(|end| *end > start);
+        let end = ends.min().unwrap_or(self.description.len());
+        let head = format!("`{word}`: ");
+        let clause = self.description[start + head.len()..end].trim();
+        let mut letters = clause.chars();
+        letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+    }
+}
+
+fn describe_warning(kind: WarningKind) -> String {
+    format!("A warning about `{}`. {}", kind.about().name(), kind.meaning())
+}
+
+/// The words that a key takes, alone or in a list.
+fn words(node: &Value) -> Vec<String> {
+    let listed = [&node["enum"], &node["items"]["enum"]];
+    let listed = listed.into_iter().filter_map(Value::as_array).flatten().filter_map(Value::as_str).map(str::to_string);
+    let mut all: Vec<String> = listed.collect();
+    let pattern = node["pattern"].as_str().and_then(|text| text.strip_prefix("^(")?.strip_suffix(")$"));
+    let alternatives = pattern.into_iter().flat_map(|text| text.split('|')).map(str::to_string);
+    all.extend(alternatives.filter(|word| word.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')));
+    all.sort();
+    all.dedup();
+    all
 }
 
 fn kinds(node: &Value) -> String {
@@ -282,16 +350,43 @@ mod tests {
 
     #[test]
     fn keys_are_explained_wherever_they_stand() {
-        let one = |word: &str| explain(word).unwrap().remove(0);
+        let one = |word: &str| explain(word).remove(0);
         let elements = one("beam.elements");
         assert_eq!((elements.table.as_str(), elements.unit.as_deref()), ("[[beam]]", None));
         assert!(elements.kinds.contains("whole number") && elements.examples[0] == "elements = 10");
         assert_eq!(one("section.rhoA").unit.as_deref(), Some("mass/length"));
         assert!(one("[[stage]]").keys.contains(&"until".into()) && one("until.below").path == "stage.until.below");
-        assert!(["moment", "history"].into_iter().all(|word| explain(word).is_ok_and(|all| !all.is_empty())));
-        assert_eq!(explain("elemnts"), Err(Some("elements".into())));
-        assert_eq!(explain("dt"), Err(Some("step".into())));
-        assert_eq!(explain("qqqqqqqqqqqqqq"), Err(None));
+        assert!(["moment", "history"].into_iter().all(|word| !explain(word).is_empty()));
+        for (word, meant) in [("elemnts", Some("elements")), ("dt", Some("step")), ("hinge", Some("revolute"))] {
+            assert_eq!((explain(word), similar(word, &[]).meant()), (Vec::new(), meant));
+        }
+        assert_eq!(similar("contact", &[]).help().unwrap(), "contact is not supported yet");
+        assert_eq!(similar("xylophone", &[]), Hint::None);
+    }
+
+    #[test]
+    fn every_word_is_explained() {
+        let mut count = 0;
+        for (path, words) in words_of_keys() {
+            for word in words.into_iter().filter(|word| word != "false") {
+                let found = explain(&word).into_iter().find(|entry| entry.path == path && entry.word.is_some());
+                let entry = found.unwrap_or_else(|| panic!("`{word}` of {path} is not explained"));
+                assert!(
+                    !entry.description.is_empty() && entry.examples[0].contains(&format!("\"{word}\"")),
+                    "{entry:?}"
+                );
+                count += 1;
+            }
+        }
+        assert!(count > 80, "{count}");
+        let word = |name: &str, path: &str| explain(name).into_iter().find(|entry| entry.path == path).unwrap();
+        let cylindrical = word("cylindrical", "joint.kind").description;
+        assert!(cylindrical.starts_with("The sliding along `axis`") && cylindrical.ends_with("with a body between."));
+        let quaternion = word("q", "output.columns");
+        assert_eq!(quaternion.description, "Unit quaternion of the rotation.");
+        assert_eq!(quaternion.examples, ["columns = [\"q\"]"]);
+        assert!(word("limit_point", "expect.warns").description.starts_with("A warning about `path`. "));
+        assert_eq!(word("newmark", "stage.scheme").default.as_deref(), Some("\"newmark\""));
     }
 
     #[test]

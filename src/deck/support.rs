@@ -89,6 +89,9 @@ fn read_fix(context: &Context, item: &Item) -> Option<[bool; 6]> {
             context.report(unknown_direction(word, item.span()).help(help.unwrap_or(FIX.into())));
             None
         }
+        DeValue::Array(list) if list.iter().any(|entry| matches!(entry.get_ref(), DeValue::Integer(_))) => {
+            context.wrong(item.span(), format!("{FIX}, not numbers"))
+        }
         DeValue::Array(_) => {
             let words = context.texts(item)?;
             let mut fix = [false; 6];

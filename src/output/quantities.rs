@@ -29,10 +29,21 @@ impl Units {
         Self { length, force, time }
     }
 
+    /// The names of dimensions in the place of units.
+    pub fn dimensions() -> Self {
+        let [length, force, time] = ["length", "force", "time"].map(|name| Some(name.to_string()));
+        Self { length, force, time }
+    }
+
+    /// The unit of the columns of a row of the table of columns.
+    pub fn of_part(&self, part: &ColumnPart) -> Option<String> {
+        self.label(part.quantity.dimension())
+    }
+
     /// The unit of a column, such as `N·m` or `mm/s²`. Plain numbers have none, nor have columns whose
     /// unit has a part that the deck does not give.
     pub fn of_column(&self, column: &str) -> Option<String> {
-        self.label(find(column)?.quantity.dimension())
+        self.of_part(find(column)?)
     }
 
     /// The unit of lengths.

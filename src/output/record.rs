@@ -16,6 +16,9 @@ use xxhash_rust::xxh3::Xxh3;
 /// Bytes of a file that are read at once
 const READ_AT_ONCE: usize = 1 << 16;
 
+/// The status of a run that did not fail.
+const FINISHED: &str = "finished";
+
 /// A run that has ended.
 pub struct FinishedRun<'a> {
     /// Success, or why it failed
@@ -291,7 +294,7 @@ impl Record {
         };
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
-            status: result.as_ref().map_or_else(Failure::name, |()| "finished").into(),
+            status: result.as_ref().map_or_else(Failure::name, |()| FINISHED).into(),
             files: Vec::new(),
             resumed,
             deck: scene.resolved.clone(),
@@ -343,6 +346,11 @@ impl Record {
     /// Labels of the units of the deck.
     pub fn units(&self) -> Units {
         Units::of_deck(&self.deck)
+    }
+
+    /// The name of the failure that ended the run, if it did not finish.
+    pub fn failure(&self) -> Option<&str> {
+        Some(self.status.as_str()).filter(|status| !["", FINISHED].contains(status))
     }
 
     /// True if a signal ended the run.

@@ -185,6 +185,10 @@ fn group_keys() -> impl Iterator<Item = &'static str> {
 fn unknown_group(key: &Spanned<String>) -> Diagnostic {
     let known: Vec<&'static str> = group_keys().collect();
     let diagnostic = unknown("group of columns", key, known.iter().copied());
+    let suffix = key.value.rsplit_once('.').map_or(key.value.as_str(), |(_, suffix)| suffix);
+    if let Some(group) = COLUMNS.iter().find(|group| group.component(suffix).is_some()) {
+        return diagnostic.help(format!("`{suffix}` is a column of the group `{}`", group.key));
+    }
     match hint("columns", &key.value, &known) {
         Some(help) => diagnostic.help(help),
         None => diagnostic.help(format!("known groups: {}", one_of(known))),

@@ -25,12 +25,15 @@ pub struct ComparedHistories {
     pub columns: Vec<Comparison>,
     /// The names of columns that the stored history lacks
     pub extra: Vec<String>,
+    /// The names of columns with cells that are NaN in both histories
+    pub nan: Vec<String>,
 }
 
 /// Compares the columns that `stored` has; a column or row that `came` lacks is an error.
 ///
 /// A cell passes where |came - stored| <= atol + rtol |stored|. The error bars of both histories
-/// (`tip.ux.err`) are added to the right side; they are not compared themselves.
+/// (`tip.ux.err`) are added to the right side; they are not compared themselves. NaN equals NaN and no
+/// number, as in numpy.testing.assert_allclose: a stored NaN is a result, too.
 pub fn compare(
     came: &HistoryReader,
     stored: &HistoryReader,
@@ -44,6 +47,7 @@ pub fn compare(
         return Err(ComparisonError::Empty);
     }
     let mut table = Vec::new();
+    let mut nan = Vec::new();
     for (k, column) in stored.names.iter().enumerate().filter(|(_, name)| !is_bar(name)) {
         let bars = [came, stored].map(|history| (history, history.names.iter().position(|n| *n == bar_of(column))));
         let bar = |row: usize| -> f64 {
@@ -52,11 +56,14 @@ pub fn compare(
         let Some(other) = came.names.iter().position(|name| name == column) else {
             return Err(ComparisonError::MissingColumn(column.clone()));
         };
+        if came.rows.iter().zip(&stored.rows).any(|(a, b)| a[other].is_nan() && b[k].is_nan()) {
+            nan.push(column.clone());
+        }
         let cells = came.rows.iter().zip(&stored.rows).map(|(a, b)| (a[other], b[k]));
         let judged = cells.enumerate().map(|(row, (came, stored))| {
             let allowed = atol + rtol * stored.abs() + bar(row);
             let difference = (came - stored).abs();
-            // Equal cells pass with any tolerance. NaN equals NaN, and no number.
+            // Equal cells pass with any tolerance.
             let same = came == stored || (came.is_nan() && stored.is_nan());
             let ratio = if same { 0.0 } else { difference / allowed };
             let ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
@@ -65,7 +72,7 @@ pub fn compare(
         table.extend(judged.max_by(|a, b| a.ratio.total_cmp(&b.ratio)));
     }
     let extra = came.names.iter().filter(|name| !stored.names.contains(name) && !is_bar(name)).cloned().collect();
-    Ok(ComparedHistories { columns: table, extra })
+    Ok(ComparedHistories { columns: table, extra, nan })
 }
 
 /// The name of the error bars of a column.
@@ -90,7 +97,7 @@ mod tests {
     fn the_worst_cell_of_each_column_is_told() {
         let a = history(&[[0.0, 1.0], [1.0, 2.0 + 1e-6], [2.0, 3.0]]);
         let b = history(&[[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]]);
-        let ComparedHistories { columns: table, extra } = compare(&a, &b, 1e-9, 0.0).unwrap();
+        let ComparedHistories { columns: table, extra, .. } = compare(&a, &b, 1e-9, 0.0).unwrap();
         assert!(extra.is_empty());
         assert_eq!(table[0].ratio, 0.0);
         assert_eq!(table[1].row, 2);
@@ -116,15 +123,21 @@ mod tests {
             a.rows.iter_mut().for_each(|row| row.truncate(2));
             a.rows.iter_mut().for_each(|row| row.push(error));
             for (one, other) in [(&a, &b), (&b, &a)] {
-                let ComparedHistories { columns: table, extra } = compare(one, other, 0.0, 1e-12).unwrap();
+                let ComparedHistories { columns: table, extra, .. } = compare(one, other, 0.0, 1e-12).unwrap();
                 assert_eq!((table.len(), table[1].ratio <= 1.0, extra.len()), (2, passes, 0));
             }
         }
     }
 
     #[test]
-    fn nan_never_equals_a_number() {
-        let (a, b) = (history(&[[0.0, f64::NAN]]), history(&[[0.0, 1.0]]));
-        assert_eq!(compare(&a, &b, 1.0, 1.0).unwrap().columns[1].ratio, f64::INFINITY);
+    fn nan_equals_nan_and_no_number() {
+        let broken = history(&[[0.0, f64::NAN]]);
+        let sound = history(&[[0.0, 1.0]]);
+        for (a, b, ratio, nan) in
+            [(&broken, &sound, f64::INFINITY, 0), (&sound, &broken, f64::INFINITY, 0), (&broken, &broken, 0.0, 1)]
+        {
+            let compared = compare(a, b, 1.0, 1.0).unwrap();
+            assert_eq!((compared.columns[1].ratio, compared.nan.len()), (ratio, nan));
+        }
     }
 }

@@ -171,6 +171,41 @@ fn wrong_decks_and_missing_files_have_their_status() {
     assert_eq!(status(&folder.beamsim(&["run", "good.toml", "--out", "file"])), 4);
 }
 
+/// A negative number is the value of the option before it: what is wrong is its value, not its sign.
+#[test]
+fn negative_numbers_are_values_of_options() {
+    let folder = Folder::new("negative");
+    folder.write("good.toml", GOOD);
+    folder.write("bar.csv", "a,b\n1,nan\n");
+    for (words, told) in [
+        (&["run", "good.toml", "--accuracy", "-1"][..], "--accuracy"),
+        (&["run", "good.toml", "--budget", "-1"], "--budget"),
+        (&["run", "good.toml", "--threads", "-1"], "--threads"),
+        (&["run", "good.toml", "--set", "-1"], "-1"),
+        (&["compare", "bar.csv", "bar.csv", "--rtol", "-0.001"], "--rtol and --atol must be finite"),
+        (&["effects", "good.toml", "--tolerance", "-0.5"], "tolerance"),
+        (&["sweep", "good.toml", "--vary", "param.f=1:2", "--sample", "-1"], "--sample"),
+        (&["sweep", "good.toml", "--vary", "param.f=1:2", "--sample", "2", "--seed", "-1"], "--seed"),
+    ] {
+        let output = folder.beamsim(words);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(status(&output), 2, "{words:?}: {text}");
+        assert!(last_line(&output).contains(told), "{words:?}: {text}");
+        assert!(!text.contains("unexpected argument") && !text.contains("-- -"), "{words:?}: {text}");
+    }
+    // Other values that begin with `-` are joined to their option; `--` would make decks of them.
+    for (words, tip) in
+        [(["--budget", "-5s"], "by `=`"), (["--accuracy", "-1e-3"], "by `=`"), (["--times", "3"], "--help")]
+    {
+        let output = folder.beamsim(&[&["run", "good.toml"][..], &words].concat());
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(status(&output) == 2 && text.contains(tip) && !text.contains("use '-- "), "{text}");
+    }
+    assert_eq!(status(&folder.beamsim(&["run", "good.toml", "--set", "param.f=-5"])), 0);
+    let same = folder.beamsim(&["compare", "bar.csv", "bar.csv"]);
+    assert!(status(&same) == 0 && String::from_utf8_lossy(&same.stdout).contains("NaN in both histories"));
+}
+
 #[test]
 fn check_tells_what_would_be_simulated() {
     let folder = Folder::new("check");

@@ -131,11 +131,14 @@ fn stages_follow_each_other_on_the_horizontal_axis() {
 fn what_cannot_be_drawn_is_told() {
     let folder = Folder::new("plot_wrong");
     folder.write("h.csv", "stage,time,load,tip.uz\n1,0,0,0\n1,1,1,0.07\n");
-    folder.write("empty.csv", "stage,time,load\n");
+    folder.write("clocks.csv", "stage,time,load\n1,0,0\n");
+    folder.write("empty.csv", "stage,time,load,tip.uz\n");
     for (words, told) in [
         (&["h.csv", "--column", "tip.uq"][..], "did you mean `tip.uz`?"),
         (&["h.csv", "--x", "lod"], "did you mean `load`?"),
-        (&["empty.csv"], "no columns to plot"),
+        (&["clocks.csv"], "no columns to plot"),
+        (&["empty.csv"], "empty.csv has no rows"),
+        (&["h.csv", "--reference", "empty.csv"], "empty.csv has no rows"),
         (&["nothing.csv"], "nothing.csv"),
         (&["h.csv", "--out", "h.pdf"], "unknown file type `.pdf`: plots are written as .svg or .png"),
         #[cfg(not(feature = "png"))]
@@ -151,4 +154,79 @@ fn what_cannot_be_drawn_is_told() {
         assert_eq!(status(&folder.beamsim(&["plot", name, "--out", "s.svg"])), 0);
         assert!(!fs::read_to_string(folder.0.join("s.svg")).unwrap().contains("NaN"));
     }
+}
+
+#[test]
+fn columns_that_are_left_out_are_listed() {
+    let folder = Folder::new("plot_columns");
+    let history = |suffixes: &[&str]| {
+        let names: Vec<String> = suffixes.iter().map(|suffix| format!("tip.{suffix}")).collect();
+        let row = |value: &str| format!(",{value}").repeat(names.len());
+        format!("stage,time,load,{}\n1,0,0{}\n1,1,1{}\n", names.join(","), row("0"), row("1"))
+    };
+    let resultants = ["n1", "n2", "n3", "m1", "m2", "m3", "rx", "ry"];
+    folder.write("resultants.csv", &history(&resultants));
+    folder.write("mixed.csv", &history(&["rx", "ux", "uz"]));
+    folder.write("few.csv", &history(&["ux", "uz"]));
+    let many: Vec<String> = (0..20).map(|k| format!("q{k}")).collect();
+    folder.write("many.csv", &history(&many.iter().map(String::as_str).collect::<Vec<_>>()));
+    for (name, told) in [
+        (
+            "resultants.csv",
+            "drawn: the first 6 of 8 columns (there are no displacements); not drawn: tip.rx, tip.ry; choose columns by --column",
+        ),
+        ("mixed.csv", "drawn: displacements that change; not drawn: tip.rx; choose columns by --column"),
+        ("many.csv", "and 6 more; choose columns by --column"),
+        ("few.csv", ""),
+    ] {
+        let output = folder.beamsim(&["plot", name, "--out", "p.svg"]);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(status(&output) == 0 && text.contains(told), "{name}: {text}");
+        assert_eq!(text.contains("not drawn"), !told.is_empty(), "{name}: {text}");
+    }
+    let named = folder.beamsim(&["plot", "resultants.csv", "--column", "tip.m1", "--out", "p.svg"]);
+    assert!(!String::from_utf8_lossy(&named.stdout).contains("drawn"));
+}
+
+#[test]
+fn every_stage_is_named_at_its_start() {
+    let folder = Folder::new("plot_short_stages");
+    // Stages 2 and 3 begin within a thousandth of the axis, stages 5 to 8 at its end.
+    let starts = [0.0, 5.0, 5.01, 9.0, 9.97, 9.98, 9.99, 9.995];
+    let rows: Vec<String> = starts
+        .iter()
+        .enumerate()
+        .map(|(k, start)| {
+            let end = starts.get(k + 1).unwrap_or(&10.0);
+            format!("{stage},{start},1,0\n{stage},{end},1,1\n", stage = k + 1)
+        })
+        .collect();
+    folder.write("h.csv", &format!("stage,time,load,tip.uz\n{}", rows.concat()));
+    assert_eq!(status(&folder.beamsim(&["plot", "h.csv", "--out", "p.svg"])), 0);
+    assert_eq!(texts(&folder, "p.svg", "boundary"), ["stage 2, stage 3", "stage 4 … stage 8"]);
+}
+
+#[test]
+fn runs_that_failed_are_marked() {
+    let folder = Folder::new("plot_failed");
+    for deck in ["arm.toml", "stiff.toml"] {
+        folder.write(deck, &format!("title = \"An arm\"\n{DECK}"));
+    }
+    let tight = ["run", "stiff.toml", "--set", "stage.0.max_iterations=1", "--set", "stage.0.adaptive=false"];
+    assert_eq!(status(&folder.beamsim(&tight)), 3);
+    assert_eq!(status(&folder.beamsim(&["run", "arm.toml"])), 0);
+    let told = "the run did not finish (not_converged); its history ends there";
+    let one = folder.beamsim(&["plot", "results/stiff", "--out", "p.svg"]);
+    assert!(status(&one) == 0 && String::from_utf8_lossy(&one.stderr).contains(told), "{}", last_line(&one));
+    assert_eq!(texts(&folder, "p.svg", "title"), ["An arm (did not finish: not_converged)"]);
+    let both = folder.beamsim(&["plot", "results/arm", "results/stiff", "--column", "tip.uz", "--out", "p.svg"]);
+    assert!(status(&both) == 0 && last_line(&both).contains(told), "{}", last_line(&both));
+    // Runs of one title keep it.
+    assert_eq!(texts(&folder, "p.svg", "title"), ["An arm"]);
+    assert_eq!(texts(&folder, "p.svg", "legend"), ["arm", "stiff (did not finish: not_converged)"]);
+    // A run that failed before its first state.
+    folder.write("results/stiff/history.partial.csv", "stage,time,load,tip.uz\n");
+    let empty = folder.beamsim(&["plot", "results/stiff"]);
+    assert_eq!(status(&empty), 2);
+    assert!(last_line(&empty).ends_with("has no rows: the run failed before its first state (not_converged)"));
 }

@@ -49,6 +49,23 @@ fn keys_are_explained_and_wrong_ones_told() {
         status(&told) == 0 && text.starts_with("rhoA, in [section.NAME]") && text.contains("unit: mass/length"),
         "{text}"
     );
+    for (name, told) in [
+        ("cylindrical", &["cylindrical, a value of `kind` in [[joint]]\n  The sliding along `axis`"][..]),
+        ("q", &["q, a value of `columns` in [output]", "tip.qw, tip.qx, tip.qy, tip.qz: columns of a node"]),
+        ("tip.my", &["reaction moment; unit: force·length; written by columns = [\"reaction\"]"]),
+        ("limit_point", &["limit_point, a value of `warns` in [[expect]]", "about `path`"]),
+        ("not_converged", &["a value of `fails` in [[expect]]"]),
+        ("lie_generalized_alpha", &["a value of `scheme` in [[stage]]", "in [cost]"]),
+        ("buckling", &["a value of `kind` in [[stage]]"]),
+        ("follower_tangent", &["follower_tangent, in [effects]"]),
+        ("load", &["load, in the deck", "a value of `control` in [[stage]]", "load: columns of the run"]),
+        ("omega", &["angular frequency; unit: rad/time"]),
+    ] {
+        let output = folder.beamsim(&["explain", name]);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(status(&output) == 0 && told.iter().all(|told| text.contains(told)), "{name}: {text}");
+    }
+    assert!(last_line(&folder.beamsim(&["explain", "contact"])).contains("contact is not supported yet"));
     let wrong = folder.beamsim(&["explain", "elemnts"]);
     assert_eq!((status(&wrong), last_line(&wrong).contains("did you mean `elements`?")), (2, true));
 }

@@ -94,6 +94,36 @@ impl Ruler {
     }
 }
 
+/// Neighbouring boundaries that share a name.
+struct BoundaryGroup<'a> {
+    /// The wanted left end of the name, in pixels
+    at: f64,
+    names: Vec<&'a str>,
+    /// The left end of the name, in pixels
+    start: f64,
+    /// The right end of the name, in pixels
+    end: f64,
+}
+
+impl<'a> BoundaryGroup<'a> {
+    /// A group whose name is moved to the left if it would leave the axis.
+    fn new(at: f64, names: Vec<&'a str>, axis: &Ruler) -> Self {
+        let mut group = Self { at, names, start: at, end: at };
+        let length = width(&group.name(), TICK_SIZE);
+        group.start = at.min(axis.end - length).max(axis.start);
+        group.end = group.start + length;
+        group
+    }
+
+    /// The names of up to two boundaries, else the first and the last.
+    fn name(&self) -> String {
+        match &self.names[..] {
+            [first, _, .., last] => format!("{first} … {last}"),
+            few => few.join(", "),
+        }
+    }
+}
+
 /// An entry of the legend. The entry of the level has no line.
 struct Entry<'a> {
     line: Option<&'a Line>,
@@ -236,22 +266,35 @@ impl<'a> Layout<'a> {
         points.iter().map(|&(x, y)| mark_data(mark, (self.x.pixel(x), self.y.pixel(y)), size)).collect()
     }
 
-    /// Draws names at the top, to the right of their lines. A name that would overlap the one before
-    /// it is left out.
+    /// Draws names at the top, to the right of their lines. Boundaries that are too close for names
+    /// of their own share one.
     fn draw_boundary_names(&self, svg: &mut Svg) {
-        let mut free_from = self.x.start;
+        for group in self.boundary_groups() {
+            svg.text(Text {
+                anchor: Anchor::Start,
+                class: "boundary",
+                ..small(&group.name(), group.start, self.y.end + 13.0)
+            });
+        }
+    }
+
+    /// Boundaries from left to right, in groups whose names do not overlap.
+    fn boundary_groups(&self) -> Vec<BoundaryGroup<'_>> {
+        let mut groups: Vec<BoundaryGroup> = Vec::new();
         for boundary in &self.plot.boundaries {
             let at = self.x.pixel(boundary.at) + 4.0;
-            let end = at + width(&boundary.name, TICK_SIZE);
-            if at >= free_from && end <= self.x.end {
-                svg.text(Text {
-                    anchor: Anchor::Start,
-                    class: "boundary",
-                    ..small(&boundary.name, at, self.y.end + 13.0)
-                });
-                free_from = end + 6.0;
+            groups.push(BoundaryGroup::new(at, vec![&boundary.name], &self.x));
+            while let [.., before, last] = &groups[..]
+                && before.end + 6.0 > last.start
+            {
+                let mut names = before.names.clone();
+                names.extend(last.names.iter().filter(|name| !before.names.contains(name)));
+                let joined = BoundaryGroup::new(before.at, names, &self.x);
+                groups.truncate(groups.len() - 2);
+                groups.push(joined);
             }
         }
+        groups
     }
 
     fn draw_axes(&self, svg: &mut Svg) {
