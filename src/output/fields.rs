@@ -25,6 +25,14 @@ struct FieldFile {
     time: f64,
 }
 
+/// A row that may have to be written later.
+struct PendingRow {
+    moment: Moment,
+    state: State,
+    /// The state about which the stage is linear
+    origin: Option<State>,
+}
+
 /// Writes the fields of a run.
 pub struct FieldsWriter {
     folder: PathBuf,
@@ -35,7 +43,7 @@ pub struct FieldsWriter {
     /// The files so far
     written: Vec<FieldFile>,
     /// A row that is written only if no other follows
-    pending: Option<(Moment, State)>,
+    pending: Option<PendingRow>,
 }
 
 impl FieldsWriter {
@@ -53,15 +61,15 @@ impl FieldsWriter {
         self.pending = None;
         let moment = Moment { stage: at.stage, time, load: at.state.load };
         if row.wanted {
-            return self.write(moment, at.state);
+            return self.write(moment, at.state, at.origin);
         }
-        self.pending = Some((moment, at.state.clone()));
+        self.pending = Some(PendingRow { moment, state: at.state.clone(), origin: at.origin.cloned() });
         Ok(())
     }
 
     /// Writes a file; the time of `at` is the one for ParaView.
-    fn write(&mut self, at: Moment, state: &State) -> Result<(), OutputError> {
-        let content = grid(&self.figure, at.stage, state);
+    fn write(&mut self, at: Moment, state: &State, origin: Option<&State>) -> Result<(), OutputError> {
+        let content = grid(&self.figure, at.stage, state, origin);
         let name = format!("{:06}.vtu", self.written.len());
         let path = self.part.join(&name);
         fs::write(&path, content).map_err(|error| OutputError::file(&path, error))?;
@@ -71,8 +79,8 @@ impl FieldsWriter {
 
     /// Gives the fields their names: `fields`, or `fields.partial` where the run failed.
     pub fn finish(mut self, finished: bool) -> Result<(), OutputError> {
-        if let Some((moment, state)) = self.pending.take() {
-            self.write(moment, &state)?;
+        if let Some(PendingRow { moment, state, origin }) = self.pending.take() {
+            self.write(moment, &state, origin.as_ref())?;
         }
         remove_fields(&self.folder)?;
         let name = if finished { "fields" } else { "fields.partial" };
@@ -145,9 +153,9 @@ impl Grid {
     }
 }
 
-/// A state as an unstructured grid.
-fn grid(figure: &Figure, stage: usize, state: &State) -> Vec<u8> {
-    let looks = figure.looks(state);
+/// A state as an unstructured grid. `origin` is the state about which the stage is linear.
+fn grid(figure: &Figure, stage: usize, state: &State, origin: Option<&State>) -> Vec<u8> {
+    let looks = figure.looks(state, origin);
     let cells = Cells::of(figure);
     let mut grid = Grid::default();
     grid.tag("<?xml version=\"1.0\"?>");

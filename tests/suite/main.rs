@@ -19,6 +19,7 @@ mod invariance;
 mod joints;
 mod laws;
 mod layers;
+mod linear_stages;
 mod masses;
 mod mechanics;
 mod mechanisms;

@@ -75,12 +75,21 @@ pub struct Film {
     frames: Vec<Frame>,
     /// Each n-th row has a frame
     stride: usize,
-    /// The last row: its number and its state
-    pending: Option<(usize, State)>,
+    /// The last row, where it has no frame yet
+    pending: Option<PendingFrame>,
     events: Vec<Value>,
     before: [u64; 2],
     supports: Vec<usize>,
     joints: Vec<usize>,
+}
+
+/// A row that gets a frame if no other follows.
+struct PendingFrame {
+    /// Of the history
+    row: usize,
+    state: State,
+    /// The state about which the stage is linear
+    origin: Option<State>,
 }
 
 struct Frame {
@@ -120,11 +129,12 @@ impl Film {
         let due = row.wanted && self.written.is_multiple_of(self.stride);
         self.pending = None;
         if due {
-            self.frames.push(self.frame(self.written, at.state));
+            self.frames.push(self.frame(self.written, at.state, at.origin));
             self.thin();
         } else {
             // The last row is always written.
-            self.pending = Some((self.written, at.state.clone()));
+            self.pending =
+                Some(PendingFrame { row: self.written, state: at.state.clone(), origin: at.origin.cloned() });
         }
         self.written += usize::from(row.wanted);
     }
@@ -141,8 +151,8 @@ impl Film {
         self.before = now;
     }
 
-    fn frame(&self, row: usize, state: &State) -> Frame {
-        let looks = self.figure.looks(state);
+    fn frame(&self, row: usize, state: &State, origin: Option<&State>) -> Frame {
+        let looks = self.figure.looks(state, origin);
         let of = || self.shown.iter().flatten().map(|&k| &looks[k]);
         Frame {
             row,
@@ -166,7 +176,8 @@ impl Film {
 
     /// Rows of the history that have a frame, after the run; the history has so many rows.
     pub fn end(&mut self, rows: usize) -> Vec<usize> {
-        let last = self.pending.take().map(|(row, state)| self.frame(row, &state));
+        let last = self.pending.take();
+        let last = last.map(|PendingFrame { row, state, origin }| self.frame(row, &state, origin.as_ref()));
         self.frames.extend(last);
         // A run that was stopped has written less than the one that was filmed for it.
         self.frames.retain(|frame| frame.row < rows);
