@@ -2,6 +2,7 @@
 
 mod assembled;
 mod bad_decks;
+mod buckling;
 mod builder;
 mod coefficients;
 mod command;

@@ -49,6 +49,20 @@ const MOST_EXTRAPOLATIONS: usize = 48;
 const NOTHING_BUCKLES: &str = "no load of this scene reduces its stiffness, so it cannot buckle (follower loads may \
                                cause flutter: use a modal stage)";
 
+/// A critical load on its path.
+struct Found {
+    critical: CriticalLoad,
+    /// True if the path by load control ends there: no other critical load lies behind it
+    ends_path: bool,
+}
+
+impl Found {
+    /// A load that was reached, or only estimated, without an end of the path.
+    fn on_the_way(load: f64, kind: CriticalKind) -> Self {
+        Self { critical: CriticalLoad { load, kind }, ends_path: false }
+    }
+}
+
 /// A buckling stage.
 pub(super) struct Buckling<'s, 'r> {
     pub stage: &'s mut StageRun<'r>,
@@ -74,8 +88,15 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         // pivots.
         let uncertainty = self.stage.counters.work.uncertainty;
         let mut found = Vec::new();
+        // Loads above the present one, then those below it: the path ends in this direction.
+        let mut ended = [false; 2];
         for number in 0..loads.len() {
-            found.push(self.find(&loads, number, &start)?);
+            let ended = &mut ended[usize::from(loads[number] < load)];
+            if !*ended {
+                let Found { critical, ends_path } = self.find(&loads, number, &start)?;
+                found.push(critical);
+                *ended = ends_path;
+            }
         }
         self.stage.counters.work.uncertainty = uncertainty;
         found.sort_by(|a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
@@ -108,26 +129,26 @@ impl Buckling<'_, '_> {
 
     /// The critical load that looks from the start as number `number` of these. The state is then
     /// the start again.
-    fn find(&mut self, loads: &[f64], number: usize, start: &State) -> Result<CriticalLoad, Failure> {
+    fn find(&mut self, loads: &[f64], number: usize, start: &State) -> Result<Found, Failure> {
         let is_back = |load: f64| load < start.load;
         // Of the loads on this side of the present one it is number `before`.
         let before = loads[..number].iter().filter(|&&load| is_back(load) == is_back(loads[number])).count();
         // The look from the start is as much work as a search.
         let count = loads.len() as f64;
         let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
-        let mut critical = self.follow(loads[number], before, &done)?;
+        let mut found = self.follow(loads[number], before, &done)?;
         self.stage.go_back_to(start);
-        if critical.kind == CriticalKind::Estimate {
-            critical.load = self.extrapolate(loads[number], before)?.unwrap_or(critical.load);
+        if found.critical.kind == CriticalKind::Estimate {
+            found.critical.load = self.extrapolate(loads[number], before)?.unwrap_or(found.critical.load);
             self.stage.go_back_to(start);
         }
-        Ok(critical)
+        Ok(found)
     }
 
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative.
     /// Every attempt starts from the last point before it, since behind it the way back is not sure
     /// to be the same. `done` tells the part of the stage that lies behind with some part of this.
-    fn follow(&mut self, estimate: f64, before: usize, done: &dyn Fn(f64) -> f64) -> Result<CriticalLoad, Failure> {
+    fn follow(&mut self, estimate: f64, before: usize, done: &dyn Fn(f64) -> f64) -> Result<Found, Failure> {
         let start_rate = self.size_of_rate()?;
         let none = negative_pivots(self.stage);
         let mut search = CriticalSearch::new(self.stage.state.clone(), estimate);
@@ -148,7 +169,8 @@ impl Buckling<'_, '_> {
                     self.stage.state.copy_from(&search.here);
                     self.stage.judge_mesh()?;
                     let kind = self.kind_of_critical(start_rate)?;
-                    return Ok(CriticalLoad { load: found, kind });
+                    let ends_path = kind == CriticalKind::Limit && search.ended.is_some();
+                    return Ok(Found { critical: CriticalLoad { load: found, kind }, ends_path });
                 }
                 break;
             }
@@ -175,7 +197,7 @@ impl Buckling<'_, '_> {
             }
         }
         self.warn_of_estimate(search.here.load, search.ended);
-        Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
+        Ok(Found::on_the_way(search.estimate, CriticalKind::Estimate))
     }
 
     /// How far from a load, relative to it, the tangent of the last point before it looks singular.
@@ -257,7 +279,7 @@ impl Buckling<'_, '_> {
         mut critical: f64,
         before: usize,
         done: &dyn Fn(f64) -> f64,
-    ) -> Result<CriticalLoad, Failure> {
+    ) -> Result<Found, Failure> {
         let mut walked = Walked::There;
         for _ in 0..MOST_LOOKS {
             self.stage.tell_progress(done(0.0))?;
@@ -269,7 +291,7 @@ impl Buckling<'_, '_> {
             let Some(next) = near.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))) else { break };
             critical = next;
             if (critical - from).abs() <= NEAR * critical.abs() {
-                return Ok(CriticalLoad { load: critical, kind: CriticalKind::Branch });
+                return Ok(Found::on_the_way(critical, CriticalKind::Branch));
             }
             let target = critical - 0.5 * NEAR * (critical - self.stage.state.load).signum() * critical.abs();
             walked = continue_path(self.stage, target);
@@ -278,7 +300,7 @@ impl Buckling<'_, '_> {
             }
         }
         self.warn_of_estimate(self.stage.state.load, Some(walked));
-        Ok(CriticalLoad { load: critical, kind: CriticalKind::Estimate })
+        Ok(Found::on_the_way(critical, CriticalKind::Estimate))
     }
 
     fn warn_of_turn_aside(&mut self, load: f64) {
