@@ -49,10 +49,13 @@ const MOST_EXTRAPOLATIONS: usize = 48;
 const NOTHING_BUCKLES: &str = "no load of this scene reduces its stiffness, so it cannot buckle (follower loads may \
                                cause flutter: use a modal stage)";
 
+/// Limit points whose loads differ by less, relative to the load, are one point.
+const SAME_LIMIT: f64 = 1e-6;
+
 /// A critical load on its path.
 struct Found {
     critical: CriticalLoad,
-    /// True if the path by load control ends there: no other critical load lies behind it
+    /// True if it is a limit point at which load control has ended
     ends_path: bool,
 }
 
@@ -60,6 +63,30 @@ impl Found {
     /// A load that was reached, or only estimated, without an end of the path.
     fn on_the_way(load: f64, kind: CriticalKind) -> Self {
         Self { critical: CriticalLoad { load, kind }, ends_path: false }
+    }
+}
+
+/// The limit of a path above the present load, or below it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum PathLimit {
+    /// The last critical load, if there is one, is no limit point.
+    Open,
+    /// The last critical load is a limit point, at this load.
+    At(f64),
+    /// The search for the next critical load has come to the same limit point: none lies before it.
+    Reached,
+}
+
+impl PathLimit {
+    /// The limit after one more critical load.
+    fn after(self, next: &Found) -> Self {
+        let Found { critical: CriticalLoad { load, kind }, ends_path } = *next;
+        let is_same = |limit: f64| ends_path && (load - limit).abs() < SAME_LIMIT * limit.abs();
+        match (self, kind) {
+            (Self::At(limit), _) if is_same(limit) => Self::Reached,
+            (_, CriticalKind::Limit) => Self::At(load),
+            (_, CriticalKind::Branch | CriticalKind::Estimate) => Self::Open,
+        }
     }
 }
 
@@ -88,14 +115,13 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         // pivots.
         let uncertainty = self.stage.counters.work.uncertainty;
         let mut found = Vec::new();
-        // Loads above the present one, then those below it: the path ends in this direction.
-        let mut ended = [false; 2];
+        let mut directions = [PathLimit::Open; 2];
         for number in 0..loads.len() {
-            let ended = &mut ended[usize::from(loads[number] < load)];
-            if !*ended {
-                let Found { critical, ends_path } = self.find(&loads, number, &start)?;
-                found.push(critical);
-                *ended = ends_path;
+            let direction = &mut directions[usize::from(loads[number] < load)];
+            if *direction != PathLimit::Reached {
+                let next = self.find(&loads, number, &start)?;
+                *direction = direction.after(&next);
+                found.extend((*direction != PathLimit::Reached).then_some(next.critical));
             }
         }
         self.stage.counters.work.uncertainty = uncertainty;
