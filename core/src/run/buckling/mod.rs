@@ -351,3 +351,34 @@ impl Buckling<'_, '_> {
         self.stage.warn(WarningKind::BucklingEstimate, message);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The loads that are listed of those that searches in one direction come to.
+    fn listed(searches: &[(f64, CriticalKind, bool)]) -> Vec<f64> {
+        let mut direction = PathLimit::Open;
+        let mut loads = Vec::new();
+        for &(load, kind, ends_path) in searches {
+            direction = direction.after(&Found { critical: CriticalLoad { load, kind }, ends_path });
+            if direction == PathLimit::Reached {
+                break;
+            }
+            loads.push(load);
+        }
+        loads
+    }
+
+    #[test]
+    fn a_limit_point_that_is_reached_again_ends_the_list() {
+        use CriticalKind::{Branch, Limit};
+        assert_eq!(listed(&[(9.0, Limit, true), (9.0 + 1e-7, Limit, true), (9.0, Limit, true)]), [9.0]);
+        assert_eq!(listed(&[(7.0, Branch, false), (9.0, Limit, true), (9.0, Limit, true)]), [7.0, 9.0]);
+        // Steep bifurcations pass for limit points.
+        let steep = [(1.03, Limit, true), (1.05, Branch, false), (1.07, Limit, true)];
+        assert_eq!(listed(&steep), [1.03, 1.05, 1.07]);
+        assert_eq!(listed(&[(1.0, Limit, false), (1.0, Limit, false)]), [1.0, 1.0]);
+        assert_eq!(listed(&[(1.0, Branch, false), (1.0, Branch, false)]), [1.0, 1.0]);
+    }
+}
