@@ -33,7 +33,16 @@ struct FieldFile {
 pub struct FieldsPlace {
     written: Vec<FieldFile>,
     /// A row that is written only if no other follows
-    pending: Option<(Moment, State)>,
+    pending: Option<PendingRow>,
+}
+
+/// A row that may have to be written later.
+#[derive(Clone, Deserialize, Serialize)]
+struct PendingRow {
+    moment: Moment,
+    state: State,
+    /// The state about which the stage is linear
+    origin: Option<State>,
 }
 
 /// Writes the fields of a run.
@@ -48,7 +57,7 @@ pub struct FieldsWriter {
     /// The number of files that are safe on the disk
     safe: usize,
     /// A row that is written only if no other follows
-    pending: Option<(Moment, State)>,
+    pending: Option<PendingRow>,
 }
 
 impl FieldsWriter {
@@ -95,15 +104,15 @@ impl FieldsWriter {
         self.pending = None;
         let moment = Moment { stage: at.stage, time, load: at.state.load };
         if row.wanted {
-            return self.write(moment, at.state);
+            return self.write(moment, at.state, at.origin);
         }
-        self.pending = Some((moment, at.state.clone()));
+        self.pending = Some(PendingRow { moment, state: at.state.clone(), origin: at.origin.cloned() });
         Ok(())
     }
 
     /// Writes a file; the time of `at` is the one for ParaView.
-    fn write(&mut self, at: Moment, state: &State) -> Result<(), OutputError> {
-        let content = grid(&self.figure, at.stage, state);
+    fn write(&mut self, at: Moment, state: &State, origin: Option<&State>) -> Result<(), OutputError> {
+        let content = grid(&self.figure, at.stage, state, origin);
         let name = format!("{:06}.vtu", self.written.len());
         let path = self.part.join(&name);
         fs::write(&path, content).map_err(|error| OutputError::file(&path, error))?;
@@ -114,8 +123,8 @@ impl FieldsWriter {
     /// Completes the fields, and returns the name of their index: `fields.pvd`, or
     /// `fields.partial.pvd` where the run failed.
     pub fn finish(mut self, folder: &ResultFolder, finished: bool) -> Result<&'static str, OutputError> {
-        if let Some((moment, state)) = self.pending.take() {
-            self.write(moment, &state)?;
+        if let Some(PendingRow { moment, state, origin }) = self.pending.take() {
+            self.write(moment, &state, origin.as_ref())?;
         }
         self.place()?;
         let (name, index_name) = if finished { (FIELDS, "fields.pvd") } else { (PARTIAL_FIELDS, "fields.partial.pvd") };
@@ -162,9 +171,9 @@ impl Grid {
     }
 }
 
-/// A state as an unstructured grid.
-fn grid(figure: &Figure, stage: usize, state: &State) -> Vec<u8> {
-    let looks = figure.looks(state);
+/// A state as an unstructured grid. `origin` is the state about which the stage is linear.
+fn grid(figure: &Figure, stage: usize, state: &State, origin: Option<&State>) -> Vec<u8> {
+    let looks = figure.looks(state, origin);
     let cells = Cells::of(figure);
     let mut grid = Grid::default();
     grid.tag("<?xml version=\"1.0\"?>");

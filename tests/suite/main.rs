@@ -2,6 +2,7 @@
 
 mod assembled;
 mod bad_decks;
+mod buckling;
 mod builder;
 mod coefficients;
 mod command;
@@ -19,6 +20,7 @@ mod invariance;
 mod joints;
 mod laws;
 mod layers;
+mod linear_stages;
 mod masses;
 mod mechanics;
 mod mechanisms;

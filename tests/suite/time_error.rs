@@ -19,9 +19,9 @@ fn oscillator(scheme: &str, step: f64) -> String {
     )
 }
 
-/// The same in a linear stage, whose energy is that of another theory.
+/// The oscillator in a linear stage.
 fn linear_oscillator(scheme: &str, step: f64) -> String {
-    format!("[effects]\nlarge_rotations = false\n{}", oscillator(scheme, step)).replace(", \"energy\"", "")
+    format!("[effects]\nlarge_rotations = false\n{}", oscillator(scheme, step))
 }
 
 /// A chain of 60 elements that swings in its second shape of a pendulum, in a plane or in space.

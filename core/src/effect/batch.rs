@@ -38,10 +38,10 @@ impl<const N: usize> Connection<N> {
     }
 
     /// Increments of displacements and of rotation vectors at the nodes, in the chart of the first
-    /// node, from increments `dq` of the unknowns.
-    pub fn variations_in_one_chart(&self, at: &State, dq: &[Vec3]) -> ([Vec3; N], [Vec3; N]) {
-        let du = self.nodes.map(|node| dq[node.u as usize]);
-        let dp = self.nodes.map(|node| dq[node.p as usize]);
+    /// node, from increments `dq` of the unknowns by slot.
+    pub fn variations_in_one_chart(&self, at: &State, dq: &dyn Fn(Slot) -> Vec3) -> ([Vec3; N], [Vec3; N]) {
+        let du = self.nodes.map(|node| dq(node.u));
+        let dp = self.nodes.map(|node| dq(node.p));
         match at.mixed[self.element as usize] {
             0 => (du, dp),
             mask => {

@@ -250,8 +250,9 @@ pub trait Masses {
 /// The role of effects with coordinates driven from outside: motors, free strains.
 pub trait DrivenCoordinates {
     /// Shows each driven coordinate with the derivative of the stored energy over it, for the
-    /// energy balance.
-    fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64));
+    /// energy balance. `origin` is the state about which the stage is linear; `None` in other
+    /// stages.
+    fn drives(&self, at: &State, origin: Option<&State>, show: &mut dyn FnMut(f64, f64));
 }
 
 /// The role of effects with spins that no force resists.

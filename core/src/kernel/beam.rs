@@ -156,9 +156,7 @@ impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
     ) -> Stress<T> {
         let at = self.configuration(nodes);
         let strain = at.strain(self.tangent);
-        let change = self.strain_variation(&at, du, dp);
-        let next = Strain { gamma: strain.gamma + change.gamma, kappa: strain.kappa + change.kappa };
-        self.stress(&next, free)
+        self.stress(&(strain + self.strain_variation(&at, du, dp)), free)
     }
 
     /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness.

@@ -7,6 +7,7 @@
 
 use crate::scalar::{LANES, Lanes, Pack, Real, pack};
 use crate::tensor::{Mat3, Vec3};
+use std::ops::Add;
 
 /// Gamma (translational strain, 1) and K (change of curvature, 1/length), both material.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -209,6 +210,24 @@ impl StoredLaw for Linear {
 
     fn show_directions(&self, show: &mut dyn FnMut(&Stiffness)) {
         show(&self.stiffness);
+    }
+}
+
+impl<T: Real> Add for Strain<T> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self { gamma: self.gamma + other.gamma, kappa: self.kappa + other.kappa }
+    }
+}
+
+impl<T: Real> Add for Stress<T> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self { n: self.n + other.n, m: self.m + other.m }
     }
 }
 

@@ -132,17 +132,37 @@ impl Assembly {
 
     /// Makes the stage linear: forces and tangent are from now on linearised about a state.
     pub fn linearise(&mut self, model: &Model, about: &State) -> Result<(), FrameConflict> {
-        self.linear =
-            Some(Box::new(LinearisedSystem::new(self.effects.iter().map(|acting| &*acting.effect), model, about)?));
+        self.remember_stress_of_origin(about);
+        let effects = self.effects.iter().map(|acting| (&*acting.effect, &acting.memory));
+        self.linear = Some(Box::new(LinearisedSystem::new(effects, model, about)?));
         Ok(())
     }
 
-    /// The state of linearisation of a linear stage, at rest, as the stage began, and the weights of
-    /// its tangent, if that is formed.
-    pub fn linear(&self) -> Option<(&State, Option<Weights>)> {
-        let linear = self.linear.as_ref()?;
-        let formed = linear.formed.filter(|&(_, revision)| revision == self.system.revision);
-        Some((&linear.origin, formed.map(|(weights, _)| weights)))
+    /// Writes the stresses that form the geometric stiffness of a linear stage: those of the
+    /// strains of its origin. Free strains act as loads, whose stress at the origin is relieved by
+    /// displacements.
+    fn remember_stress_of_origin(&mut self, origin: &State) {
+        let mut without_loads = origin.clone();
+        without_loads.amplitude.fill(0.0);
+        let no_correction = zeros(origin.q.len());
+        for acting in self.effects.iter_mut().filter(|acting| !acting.memory.points.is_empty()) {
+            acting.extrapolate(&without_loads, &no_correction);
+        }
+    }
+
+    /// Takes the stresses of the origin for the next tangent, which [`Self::forget`] has discarded.
+    fn recall_stress_of_origin(&mut self) {
+        self.effects.iter_mut().for_each(|acting| acting.memory.valid = !acting.memory.points.is_empty());
+    }
+
+    /// The forces of a linear stage; `None` in other stages.
+    pub(crate) fn linear(&self) -> Option<&LinearisedSystem> {
+        self.linear.as_deref()
+    }
+
+    /// The state about which the stage is linear; `None` in other stages.
+    pub fn origin(&self) -> Option<&State> {
+        self.linear().map(|linear| &linear.origin)
     }
 
     /// Forms the forces of the state and the tangent of the weights; `prescribed_increment`: see
@@ -182,7 +202,7 @@ impl Assembly {
         if known {
             self.system.clear_forces();
         } else {
-            self.forget();
+            self.recall_stress_of_origin();
             self.evaluate_effects(&linear.origin, weights, prescribed_increment);
             self.system.forget_forces();
             linear.formed = Some((weights, self.system.revision));
@@ -261,6 +281,16 @@ impl Assembly {
     /// First and second derivatives over time of the gaps of joints, by slot of their multipliers;
     /// see [`Constraint::drift`](crate::effect::Constraint::drift).
     pub fn drift(&self, state: &State) -> [Vec<Vec3>; 2] {
+        let Some(linear) = &self.linear else { return self.drift_of_effects(state) };
+        // Gaps are linear in displacements: second derivatives are those of motors alone.
+        let mut origin = linear.origin_with_loads_of(state);
+        let [_, rates2] = self.drift_of_effects(&origin);
+        origin.v.copy_from(&state.v);
+        let [rates, _] = self.drift_of_effects(&origin);
+        [rates, rates2]
+    }
+
+    fn drift_of_effects(&self, state: &State) -> [Vec<Vec3>; 2] {
         let [mut rates, mut rates2] = [state.q.len(); 2].map(zeros);
         let constraints = self.effects.iter().filter_map(|acting| acting.effect.roles().constraint);
         constraints.for_each(|constraint| constraint.drift(state, &mut rates, &mut rates2));
@@ -275,6 +305,7 @@ impl Assembly {
 
     /// The largest strain that a field of increments makes, see [`Effect::strain_of`].
     pub fn strain_of(&self, state: &State, field: &[Vec3], length: f64) -> f64 {
+        let state = self.origin().unwrap_or(state);
         self.effects.iter().map(|acting| acting.effect.strain_of(state, field, length)).fold(0.0, f64::max)
     }
 

@@ -22,6 +22,7 @@ pub use constraint::{Motion, MotionKind, Support};
 pub use course::{Amplitude, Course, Progress, Ramp, Timeline};
 pub use effect_size::EffectSize;
 pub use history::{History, NOTICED, Reading, Table};
+pub(crate) use linear::LinearisedSystem;
 pub use names::Names;
 pub use parts::ModelParts;
 pub use schedule::Schedule;
@@ -316,17 +317,26 @@ impl Model {
         sum
     }
 
-    /// Force and moment of joints to ground on a node, see [`Constraint::held_by_ground`].
-    pub fn held_by_ground(&self, state: &State, node: Node) -> (Vec3, Vec3) {
+    /// Force and moment of joints to ground on a node, see [`Constraint::held_by_ground`]. `origin`
+    /// is the state about which the stage is linear, in whose placement multipliers then act;
+    /// `None` in other stages.
+    pub fn held_by_ground(&self, state: &State, origin: Option<&State>, node: Node) -> (Vec3, Vec3) {
+        let placed = origin.filter(|_| !self.multipliers.is_empty()).map(|origin| {
+            let mut placed = origin.clone();
+            self.multipliers.iter().for_each(|&slot| placed.q[slot as usize] = state.q[slot as usize]);
+            placed
+        });
+        let state = placed.as_ref().unwrap_or(state);
         let parts = self.constraints().map(|constraint| constraint.held_by_ground(state, node));
         parts.fold((Vec3::ZERO, Vec3::ZERO), |(f, m), (force, moment)| (f + force, m + moment))
     }
 
-    /// Coordinates that are driven from outside, each with the derivative of the energy over it.
-    pub fn drives(&self, state: &State) -> Vec<(f64, f64)> {
+    /// Coordinates that are driven from outside, each with the derivative of the energy over it, see
+    /// [`DrivenCoordinates`](crate::effect::DrivenCoordinates).
+    pub fn drives(&self, state: &State, origin: Option<&State>) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
         let driven = self.effects.iter().filter_map(|effect| effect.roles().driven);
-        driven.for_each(|driven| driven.drives(state, &mut |x, force| all.push((x, force))));
+        driven.for_each(|driven| driven.drives(state, origin, &mut |x, force| all.push((x, force))));
         all
     }
 

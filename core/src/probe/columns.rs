@@ -256,7 +256,7 @@ pub static COLUMNS: [ColumnGroup; 18] = [
             part("section force", Quantity::SectionForce, &["N1", "N2", "N3"]),
             part("section moment", Quantity::SectionMoment, &["M1", "M2", "M3"]),
         ],
-        source: Source::BeamPoint(|point, at, out| out.extend(point.strain_and_stress(at.state)[1])),
+        source: Source::BeamPoint(|point, at, out| out.extend(point.strain_and_stress(at.state, at.origin)[1])),
         needs: &[],
         nearest: None,
     },
@@ -266,7 +266,7 @@ pub static COLUMNS: [ColumnGroup; 18] = [
             part("strain", Quantity::Strain, &["G1", "G2", "G3"]),
             part("change of curvature", Quantity::Curvature, &["K1", "K2", "K3"]),
         ],
-        source: Source::BeamPoint(|point, at, out| out.extend(point.strain_and_stress(at.state)[0])),
+        source: Source::BeamPoint(|point, at, out| out.extend(point.strain_and_stress(at.state, at.origin)[0])),
         needs: &[],
         nearest: None,
     },
@@ -566,9 +566,11 @@ fn spin(place: &Place, at: &Snapshot) -> Spin {
 fn reaction(node: Node, at: &Snapshot, out: &mut Vec<f64>) {
     let state = at.state;
     let held = |slot: u32| at.system.pattern.dof_map.held_part(slot, at.system.total(slot as usize));
-    let (force, moment) = at.model.held_by_ground(state, node);
+    let (force, moment) = at.model.held_by_ground(state, at.origin, node);
     out.extend((held(node.u) - force).0);
-    out.extend((Rotation::new(state.q[node.p as usize]).t_inverse() * (held(node.p) - moment)).0);
+    // In linear stages moments are conjugate to rotation vectors about the origin.
+    let rotation_vector = at.origin.unwrap_or(state).q[node.p as usize];
+    out.extend((Rotation::new(rotation_vector).t_inverse() * (held(node.p) - moment)).0);
 }
 
 /// The energy account.

@@ -61,11 +61,12 @@ pub struct Look {
 }
 
 impl Figure {
-    /// All nodes of beams, then the bodies, then the ends of links.
-    pub fn looks(&self, state: &State) -> Vec<Look> {
+    /// All nodes of beams, then the bodies, then the ends of links. `origin` is the state about
+    /// which the stage is linear; `None` in other stages.
+    pub fn looks(&self, state: &State, origin: Option<&State>) -> Vec<Look> {
         let points = self.lines.iter().flat_map(|line| &line.points);
         let others = self.bodies.iter().chain(self.links.as_flattened());
-        points.map(|point| point.look(state)).chain(others.map(|place| bare(place, state))).collect()
+        points.map(|point| point.look(state, origin)).chain(others.map(|place| bare(place, state))).collect()
     }
 
     /// Number of nodes of beams.
@@ -75,8 +76,8 @@ impl Figure {
 }
 
 impl LinePoint {
-    fn look(&self, state: &State) -> Look {
-        let [strain, resultant] = self.inside.strain_and_stress(state);
+    fn look(&self, state: &State, origin: Option<&State>) -> Look {
+        let [strain, resultant] = self.inside.strain_and_stress(state, origin);
         let row = |row: &[f64; 6]| row.iter().zip(&resultant).map(|(c, s)| c * s).sum::<f64>();
         // Energy of the strains that have stress: free strains have none.
         let energy = 0.5 * self.compliance.iter().zip(&resultant).map(|(c, s)| s * row(c)).sum::<f64>();

@@ -115,11 +115,12 @@ pub struct BeamPoint {
 
 impl BeamPoint {
     /// Gamma and K, then N and M, in section axes: values at Gauss points extrapolated within the
-    /// element, mean of both sides.
-    pub fn strain_and_stress(&self, state: &State) -> [[f64; 6]; 2] {
+    /// element, mean of both sides. `origin` is the state about which the stage is linear; `None`
+    /// in other stages.
+    pub fn strain_and_stress(&self, state: &State, origin: Option<&State>) -> [[f64; 6]; 2] {
         let mut mean = [[0.0; 6]; 2];
         for &(element, xi) in &self.sides {
-            let values = self.one_side(element, xi, state);
+            let values = self.one_side(element, xi, state, origin);
             for (sum, part) in mean.iter_mut().flatten().zip(values.iter().flatten()) {
                 *sum += part / self.sides.len() as f64;
             }
@@ -128,8 +129,9 @@ impl BeamPoint {
     }
 
     /// Strains and resultants of one side: the polynomial through the values at the Gauss points.
-    fn one_side(&self, element: u32, xi: f64, state: &State) -> [[f64; 6]; 2] {
-        let values = self.elasticity.iter().find_map(|field| field.at_points(element, state)).unwrap_or_default();
+    fn one_side(&self, element: u32, xi: f64, state: &State, origin: Option<&State>) -> [[f64; 6]; 2] {
+        let values = self.elasticity.iter().find_map(|field| field.at_points(element, state, origin));
+        let values = values.unwrap_or_default();
         let abscissas: Vec<f64> = gauss(values.len()).iter().map(|&(x, _)| x).collect();
         let mut out = [[0.0; 6]; 2];
         for (g, (strain, stress)) in values.iter().enumerate() {

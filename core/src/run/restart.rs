@@ -40,9 +40,11 @@ impl StageRun<'_> {
     }
 
     fn linear_checkpoint(&self) -> Option<LinearCheckpoint> {
-        let (origin, formed) = self.assembly.linear()?;
-        let is_factorised = self.newton.solver.has_factorised(&self.assembly.system);
-        Some(LinearCheckpoint { origin: origin.clone(), factorised: formed.filter(|_| is_factorised) })
+        let linear = self.assembly.linear()?;
+        let system = &self.assembly.system;
+        let formed = linear.formed.filter(|&(_, revision)| revision == system.revision);
+        let factorised = formed.filter(|_| self.newton.solver.has_factorised(system)).map(|(weights, _)| weights);
+        Some(LinearCheckpoint { origin: linear.origin.clone(), factorised })
     }
 
     /// Takes up the stage where a checkpoint has left it.

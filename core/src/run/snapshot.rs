@@ -14,6 +14,8 @@ pub struct Snapshot<'a> {
     pub stage: usize,
     /// The state
     pub state: &'a State,
+    /// The state about which the stage is linear; `None` in other stages
+    pub origin: Option<&'a State>,
     /// Its forces
     pub system: &'a System,
     /// The scene

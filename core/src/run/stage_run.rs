@@ -3,7 +3,7 @@
 
 use super::checkpoint::AnalysisCheckpoint;
 use super::earlier_stages::EarlierStages;
-use super::energy::Bookkeeper;
+use super::energy::{Bookkeeper, Entry};
 use super::failure::{Failure, Moment};
 use super::issued::IssuedWarnings;
 use super::observer::Observer;
@@ -13,7 +13,7 @@ use super::snapshot::{Counters, Snapshot};
 use crate::interrupt;
 use crate::model::{Assembly, Charted, Model, Motion, Schedule, StageError, Timeline, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure};
-use crate::system::{Plane, Slot, State, System};
+use crate::system::{Plane, Slot, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
@@ -147,7 +147,7 @@ impl StageRun<'_> {
     /// Opens the energy account of the stage; at the start of the run also writes the first row.
     pub fn open_account(&mut self) -> Result<(), Failure> {
         if self.keeps_account {
-            self.bookkeeper.open(self.model, self.state, &self.assembly.system);
+            self.bookkeeper.open(Entry::new(self.model, self.state, &self.assembly));
         } else {
             self.bookkeeper.close();
         }
@@ -164,7 +164,7 @@ impl StageRun<'_> {
         self.judge_mesh()?;
         self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
         if self.keeps_account {
-            self.bookkeeper.add_step(self.model, self.state, &self.assembly.system);
+            self.bookkeeper.add_step(Entry::new(self.model, self.state, &self.assembly));
         }
         Ok(())
     }
@@ -186,13 +186,13 @@ impl StageRun<'_> {
 
     /// Passes a state on the way to a balance: it becomes the good one, turns are counted, and the
     /// work of its forces is booked. No row.
-    pub fn pass_through(&mut self, system: &System) -> Result<(), Failure> {
+    pub fn pass_through(&mut self, assembly: &Assembly) -> Result<(), Failure> {
         self.unless_interrupted()?;
         self.state.anchor = None;
         self.flatten();
         self.continue_to_state()?;
         if self.plan.energy {
-            self.bookkeeper.add_step(self.model, self.state, system);
+            self.bookkeeper.add_step(Entry::new(self.model, self.state, assembly));
         }
         self.good.copy_all_but_rates(self.state);
         Ok(())
@@ -209,8 +209,9 @@ impl StageRun<'_> {
         self.unless_interrupted()?;
         // The observer is borrowed beside what it looks at.
         let Self { observer, state, model, counters, bookkeeper, number, assembly, .. } = self;
+        let (system, origin) = (&assembly.system, assembly.origin());
         let ledger = bookkeeper.ledger();
-        observer.row(&Snapshot { stage: *number + 1, state, system: &assembly.system, model, ledger, counters })
+        observer.row(&Snapshot { stage: *number + 1, state, origin, system, model, ledger, counters })
     }
 
     /// Gives the result of an analysis to the observer.
@@ -223,6 +224,7 @@ impl StageRun<'_> {
         Snapshot {
             stage: self.number + 1,
             state: self.state,
+            origin: self.assembly.origin(),
             system: &self.assembly.system,
             model: self.model,
             ledger: self.bookkeeper.ledger(),
@@ -291,6 +293,10 @@ impl StageRun<'_> {
     /// since the last good state nobody knows whether that were the load or the corrections on
     /// their way to the balance: smaller levels tell.
     pub fn refuse_windings(&self) -> Result<(), NewtonFailure> {
+        // Springs of linear stages take rotation vectors of any size.
+        if self.is_linear() {
+            return Ok(());
+        }
         let turned = |slot: Slot| self.state.unwrapped_at(slot) - self.good.unwrapped_at(slot);
         let of_joint = |[a, b]: [Option<Slot>; 2]| {
             let [start, end] = [a, b].map(|slot| slot.map_or(Vec3::ZERO, turned));

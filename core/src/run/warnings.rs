@@ -79,10 +79,6 @@ impl StageRun<'_> {
 
     /// A stage that ends at rest takes kinetic energy away from what moved before.
     pub fn warn_of_standstill(&mut self) {
-        // The energy of the full theory is not that of the linear one.
-        if self.is_linear() {
-            return;
-        }
         let (Some(first), true) = (self.bookkeeper.first(), self.plan.energy && self.past.moving) else { return };
         let share = (self.bookkeeper.ledger().total() - first) / self.bookkeeper.scale();
         if is_unbalanced(share) && !std::mem::replace(&mut self.issued.unbalanced, true) {

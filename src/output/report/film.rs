@@ -84,8 +84,8 @@ pub struct Reel {
     frames: Vec<Frame>,
     /// Each n-th row has a frame
     stride: usize,
-    /// The last row: its number and its state
-    pending: Option<(usize, State)>,
+    /// The last row, where it has no frame yet
+    pending: Option<PendingFrame>,
     events: Vec<FilmEvent>,
     before: [u64; 2],
 }
@@ -97,6 +97,16 @@ struct FilmEvent {
     row: usize,
     kind: String,
     text: String,
+}
+
+/// A row that gets a frame if no other follows.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+struct PendingFrame {
+    /// Of the history
+    row: usize,
+    state: State,
+    /// The state about which the stage is linear
+    origin: Option<State>,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -142,11 +152,12 @@ impl Film {
         let due = row.wanted && self.reel.written.is_multiple_of(self.reel.stride);
         self.reel.pending = None;
         if due {
-            self.reel.frames.push(self.frame(self.reel.written, at.state));
+            self.reel.frames.push(self.frame(self.reel.written, at.state, at.origin));
             self.thin();
         } else {
             // The last row is always written.
-            self.reel.pending = Some((self.reel.written, at.state.clone()));
+            self.reel.pending =
+                Some(PendingFrame { row: self.reel.written, state: at.state.clone(), origin: at.origin.cloned() });
         }
         self.reel.written += usize::from(row.wanted);
     }
@@ -163,8 +174,8 @@ impl Film {
         self.reel.before = now;
     }
 
-    fn frame(&self, row: usize, state: &State) -> Frame {
-        let looks = self.figure.looks(state);
+    fn frame(&self, row: usize, state: &State, origin: Option<&State>) -> Frame {
+        let looks = self.figure.looks(state, origin);
         let of = || self.shown.iter().flatten().map(|&k| &looks[k]);
         Frame {
             row,
@@ -188,7 +199,8 @@ impl Film {
 
     /// Rows of the history that have a frame, after the run; the history has so many rows.
     pub fn end(&mut self, rows: usize) -> Vec<usize> {
-        let last = self.reel.pending.take().map(|(row, state)| self.frame(row, &state));
+        let last = self.reel.pending.take();
+        let last = last.map(|PendingFrame { row, state, origin }| self.frame(row, &state, origin.as_ref()));
         self.reel.frames.extend(last);
         // A run that was stopped has written less than the one that was filmed for it.
         self.reel.frames.retain(|frame| frame.row < rows);

@@ -10,8 +10,6 @@ use crate::scene::Scene;
 use crate::study::StudyError;
 use crate::study::built::BuiltDeck;
 use crate::study::outcome::{Outcome, columns};
-use crate::study::scale::quantity;
-use beamsim_core::probe::Quantity;
 use beamsim_core::run::Failure;
 use change::changes;
 use present::acts;
@@ -142,16 +140,10 @@ impl Baseline<'_> {
         if let Ok(Outcome { ended: Err(failure @ Failure::Interrupted { .. }), .. }) = &outcome {
             return Err(StudyError::Failure(failure.clone()));
         }
-        let mut changes = match &outcome {
+        let changes = match &outcome {
             Ok(outcome) if outcome.ended.is_ok() => changes(self.columns, self.length, self.whole, outcome),
             Ok(_) | Err(_) => Vec::new(),
         };
-        if words.contains(&EffectWord::LargeRotations) {
-            // The energies are those of the full theory, which linear stages do not conserve.
-            let is_energy = |column: &str| quantity(column) == Some(Quantity::Energy);
-            let energies = self.columns.iter().zip(&mut changes).filter(|(column, _)| is_energy(column));
-            energies.for_each(|(_, change)| *change = f64::NAN);
-        }
         Ok(ReducedScene { without: words.to_vec(), outcome, changes })
     }
 

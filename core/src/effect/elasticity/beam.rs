@@ -12,7 +12,7 @@ use crate::effect::{
 use crate::kernel::law::{SectionLaw, StoredLaw, Strain, Stress};
 use crate::kernel::{ElementSystem, NodePlace, Weights};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, Real, each_lane};
-use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Plane, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Plane, Slot, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::marker::PhantomData;
@@ -64,16 +64,17 @@ impl<I: Interpolation> BeamElasticity<I> {
 /// Strains and stresses in beam elements of any interpolation.
 pub trait StressField: Send + Sync {
     /// Strain and stress (material, global components) at the integration points of an element of
-    /// the scene; `None` if it belongs to another effect.
-    fn at_points(&self, element: u32, at: &State) -> Option<Vec<(Strain, Stress)>>;
+    /// the scene; `None` if it belongs to another effect. `origin` is the state about which the
+    /// stage is linear; `None` in other stages.
+    fn at_points(&self, element: u32, at: &State, origin: Option<&State>) -> Option<Vec<(Strain, Stress)>>;
 }
 
 impl<I: Interpolation> StressField for BeamElasticity<I> {
-    fn at_points(&self, element: u32, at: &State) -> Option<Vec<(Strain, Stress)>> {
+    fn at_points(&self, element: u32, at: &State, origin: Option<&State>) -> Option<Vec<(Strain, Stress)>> {
         for_each_batch!(self.elements, |_first, batch| {
             // Batches are in the order of the scene.
             if let Ok(k) = batch.binary_search_by_key(&element, |e| e.connection.element) {
-                return Some(batch[k].strains_and_stresses::<I>(at).to_vec());
+                return Some(batch[k].strains_and_stresses::<I>(at, origin).to_vec());
             }
         });
         None
@@ -204,12 +205,12 @@ impl<I: Interpolation> StressPoints for BeamElasticity<I> {
 }
 
 impl<I: Interpolation> DrivenCoordinates for BeamElasticity<I> {
-    fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
+    fn drives(&self, at: &State, origin: Option<&State>, show: &mut dyn FnMut(f64, f64)) {
         for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free().is_some()) {
             let pull: f64 = element
                 .points()
                 .iter()
-                .zip(&element.strains_and_stresses::<I>(at))
+                .zip(&element.strains_and_stresses::<I>(at, origin))
                 .map(|(point, (_, stress))| {
                     let free = point.free.unwrap_or_default();
                     -point.weight * (free.gamma.dot(stress.n) + free.kappa.dot(stress.m))
@@ -443,11 +444,35 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         self.free().map_or(0.0, |number| at.amplitude[number])
     }
 
-    /// Strain and stress at each integration point (material, global components).
-    pub fn strains_and_stresses<I: Interpolation>(&self, at: &State) -> [(Strain, Stress); G] {
-        let view = I::see(self.member(), at);
-        let free = self.free_amplitude(at);
-        self.points().map(|point| point.strain_and_stress(view.nodes(), free))
+    /// Strain and stress at each integration point (material, global components). `origin` is the
+    /// state about which the stage is linear; `None` in other stages.
+    pub fn strains_and_stresses<I: Interpolation>(&self, at: &State, origin: Option<&State>) -> [(Strain, Stress); G] {
+        match origin {
+            None => {
+                let view = I::see(self.member(), at);
+                let free = self.free_amplitude(at);
+                self.points().map(|point| point.strain_and_stress(view.nodes(), free))
+            }
+            Some(origin) => self.linear_strains_and_stresses::<I>(at, origin),
+        }
+    }
+
+    /// Strain and stress at each integration point by the linear theory about `origin`: those of
+    /// the origin, under the present free strain, and their first derivatives along the
+    /// displacements and rotation vectors from there.
+    fn linear_strains_and_stresses<I: Interpolation>(&self, at: &State, origin: &State) -> [(Strain, Stress); G] {
+        let view = I::see(self.member(), origin);
+        let displaced = |slot: Slot| at.q[slot as usize] - origin.q[slot as usize];
+        let change = I::variation(self.member(), origin, &displaced);
+        let [free, free_at_origin] = [at, origin].map(|state| self.free_amplitude(state));
+        self.points().map(|point| {
+            let nodes = view.nodes();
+            let change = point.strain_variation(&point.configuration(nodes), |i| change[i].0, |i| change[i].1);
+            let (strain, stress) = point.strain_and_stress(nodes, free);
+            // The stiffness of the stage is that of the loads and free strains of its start.
+            let added = point.law.tangent(&point.elastic_part(&strain, free_at_origin)).stress(&change);
+            (strain + change, stress + added)
+        })
     }
 
     #[inline(never)]
@@ -459,7 +484,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     /// unknowns.
     fn strain_of<I: Interpolation>(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
         let view = I::see(self.member(), at);
-        let change = I::variation(self.member(), at, field);
+        let change = I::variation(self.member(), at, &|slot| field[slot as usize]);
         let at_point = |point: &ElasticPoint<N>| {
             let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
             strain.gamma.norm().max(strain.kappa.norm() * length)
@@ -471,7 +496,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     /// stresses of a field of increments; `None` if the element is stressed.
     fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
         let view = I::see(self.member(), at);
-        let change = I::variation(self.member(), at, field);
+        let change = I::variation(self.member(), at, &|slot| field[slot as usize]);
         let free = self.free_amplitude(at);
         let length = self.points().iter().map(|point| point.weight).sum::<f64>();
         let at_point = |point: &ElasticPoint<N>| {
@@ -508,7 +533,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
         let view = I::see(self.member(), at);
         let free = self.free_amplitude(at);
-        let (du, dp) = self.connection.variations_in_one_chart(at, dq);
+        let (du, dp) = self.connection.variations_in_one_chart(at, &|slot| dq[slot as usize]);
         let stresses = view.extrapolated(&self.points(), free, &du, &dp);
         out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = packed(stress));
     }

@@ -8,7 +8,7 @@ use crate::kernel::relative::Relative;
 use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
 use crate::rotation::Rotation;
 use crate::scalar::{LANES, Lanes, Pack, Real, each_lane, pack};
-use crate::system::{Assembler, State};
+use crate::system::{Assembler, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// The configuration of an element, or of several elements side by side, with all rotation vectors
@@ -212,9 +212,10 @@ pub trait Interpolation: Send + Sync + 'static {
         Self::View::new(&ElementConfiguration::new(member, &nodes, at))
     }
 
-    /// Variations at the nodes in the frame of the kernel for increments `dq` of the unknowns.
+    /// Variations at the nodes in the frame of the kernel for increments `dq` of the unknowns by
+    /// slot.
     #[inline(never)]
-    fn variation<const N: usize>(member: ElementNodes<N>, at: &State, dq: &[Vec3]) -> [(Vec3, Vec3); N] {
+    fn variation<const N: usize>(member: ElementNodes<N>, at: &State, dq: &dyn Fn(Slot) -> Vec3) -> [(Vec3, Vec3); N] {
         let (du, dp) = member.connection.variations_in_one_chart(at, dq);
         Self::see(member, at).variation(&du, &dp)
     }

@@ -310,7 +310,8 @@ impl Constraint for Joints {
 }
 
 impl DrivenCoordinates for Joints {
-    fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
+    /// Multipliers are unknowns of linear stages, too.
+    fn drives(&self, at: &State, _origin: Option<&State>, show: &mut dyn FnMut(f64, f64)) {
         for joint in &self.joints {
             let Some((on, motor)) = joint.motor() else { continue };
             // L = lambda (coordinate - value), so that the derivative over the value is -lambda.

@@ -49,6 +49,47 @@ const MOST_EXTRAPOLATIONS: usize = 48;
 const NOTHING_BUCKLES: &str = "no load of this scene reduces its stiffness, so it cannot buckle (follower loads may \
                                cause flutter: use a modal stage)";
 
+/// Limit points whose loads differ by less, relative to the load, are one point.
+const SAME_LIMIT: f64 = 1e-6;
+
+/// A critical load on its path.
+struct Found {
+    critical: CriticalLoad,
+    /// True if it is a limit point at which load control has ended
+    ends_path: bool,
+}
+
+impl Found {
+    /// A load that was reached, or only estimated, without an end of the path.
+    fn on_the_way(load: f64, kind: CriticalKind) -> Self {
+        Self { critical: CriticalLoad { load, kind }, ends_path: false }
+    }
+}
+
+/// The limit of a path above the present load, or below it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum PathLimit {
+    /// The last critical load, if there is one, is no limit point.
+    Open,
+    /// The last critical load is a limit point, at this load.
+    At(f64),
+    /// The search for the next critical load has come to the same limit point: none lies before it.
+    Reached,
+}
+
+impl PathLimit {
+    /// The limit after one more critical load.
+    fn after(self, next: &Found) -> Self {
+        let Found { critical: CriticalLoad { load, kind }, ends_path } = *next;
+        let is_same = |limit: f64| ends_path && (load - limit).abs() < SAME_LIMIT * limit.abs();
+        match (self, kind) {
+            (Self::At(limit), _) if is_same(limit) => Self::Reached,
+            (_, CriticalKind::Limit) => Self::At(load),
+            (_, CriticalKind::Branch | CriticalKind::Estimate) => Self::Open,
+        }
+    }
+}
+
 /// A buckling stage.
 pub(super) struct Buckling<'s, 'r> {
     pub stage: &'s mut StageRun<'r>,
@@ -74,8 +115,14 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         // pivots.
         let uncertainty = self.stage.counters.work.uncertainty;
         let mut found = Vec::new();
+        let mut directions = [PathLimit::Open; 2];
         for number in 0..loads.len() {
-            found.push(self.find(&loads, number, &start)?);
+            let direction = &mut directions[usize::from(loads[number] < load)];
+            if *direction != PathLimit::Reached {
+                let next = self.find(&loads, number, &start)?;
+                *direction = direction.after(&next);
+                found.extend((*direction != PathLimit::Reached).then_some(next.critical));
+            }
         }
         self.stage.counters.work.uncertainty = uncertainty;
         found.sort_by(|a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
@@ -108,26 +155,26 @@ impl Buckling<'_, '_> {
 
     /// The critical load that looks from the start as number `number` of these. The state is then
     /// the start again.
-    fn find(&mut self, loads: &[f64], number: usize, start: &State) -> Result<CriticalLoad, Failure> {
+    fn find(&mut self, loads: &[f64], number: usize, start: &State) -> Result<Found, Failure> {
         let is_back = |load: f64| load < start.load;
         // Of the loads on this side of the present one it is number `before`.
         let before = loads[..number].iter().filter(|&&load| is_back(load) == is_back(loads[number])).count();
         // The look from the start is as much work as a search.
         let count = loads.len() as f64;
         let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
-        let mut critical = self.follow(loads[number], before, &done)?;
+        let mut found = self.follow(loads[number], before, &done)?;
         self.stage.go_back_to(start);
-        if critical.kind == CriticalKind::Estimate {
-            critical.load = self.extrapolate(loads[number], before)?.unwrap_or(critical.load);
+        if found.critical.kind == CriticalKind::Estimate {
+            found.critical.load = self.extrapolate(loads[number], before)?.unwrap_or(found.critical.load);
             self.stage.go_back_to(start);
         }
-        Ok(critical)
+        Ok(found)
     }
 
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative.
     /// Every attempt starts from the last point before it, since behind it the way back is not sure
     /// to be the same. `done` tells the part of the stage that lies behind with some part of this.
-    fn follow(&mut self, estimate: f64, before: usize, done: &dyn Fn(f64) -> f64) -> Result<CriticalLoad, Failure> {
+    fn follow(&mut self, estimate: f64, before: usize, done: &dyn Fn(f64) -> f64) -> Result<Found, Failure> {
         let start_rate = self.size_of_rate()?;
         let none = negative_pivots(self.stage);
         let mut search = CriticalSearch::new(self.stage.state.clone(), estimate);
@@ -148,7 +195,8 @@ impl Buckling<'_, '_> {
                     self.stage.state.copy_from(&search.here);
                     self.stage.judge_mesh()?;
                     let kind = self.kind_of_critical(start_rate)?;
-                    return Ok(CriticalLoad { load: found, kind });
+                    let ends_path = kind == CriticalKind::Limit && search.ended.is_some();
+                    return Ok(Found { critical: CriticalLoad { load: found, kind }, ends_path });
                 }
                 break;
             }
@@ -175,7 +223,7 @@ impl Buckling<'_, '_> {
             }
         }
         self.warn_of_estimate(search.here.load, search.ended);
-        Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
+        Ok(Found::on_the_way(search.estimate, CriticalKind::Estimate))
     }
 
     /// How far from a load, relative to it, the tangent of the last point before it looks singular.
@@ -257,7 +305,7 @@ impl Buckling<'_, '_> {
         mut critical: f64,
         before: usize,
         done: &dyn Fn(f64) -> f64,
-    ) -> Result<CriticalLoad, Failure> {
+    ) -> Result<Found, Failure> {
         let mut walked = Walked::There;
         for _ in 0..MOST_LOOKS {
             self.stage.tell_progress(done(0.0))?;
@@ -269,7 +317,7 @@ impl Buckling<'_, '_> {
             let Some(next) = near.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))) else { break };
             critical = next;
             if (critical - from).abs() <= NEAR * critical.abs() {
-                return Ok(CriticalLoad { load: critical, kind: CriticalKind::Branch });
+                return Ok(Found::on_the_way(critical, CriticalKind::Branch));
             }
             let target = critical - 0.5 * NEAR * (critical - self.stage.state.load).signum() * critical.abs();
             walked = continue_path(self.stage, target)?;
@@ -278,7 +326,7 @@ impl Buckling<'_, '_> {
             }
         }
         self.warn_of_estimate(self.stage.state.load, Some(walked));
-        Ok(CriticalLoad { load: critical, kind: CriticalKind::Estimate })
+        Ok(Found::on_the_way(critical, CriticalKind::Estimate))
     }
 
     fn warn_of_turn_aside(&mut self, load: f64) {
@@ -301,5 +349,36 @@ impl Buckling<'_, '_> {
              path up to load factor {from} ({why})"
         );
         self.stage.warn(WarningKind::BucklingEstimate, message);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The loads that are listed of those that searches in one direction come to.
+    fn listed(searches: &[(f64, CriticalKind, bool)]) -> Vec<f64> {
+        let mut direction = PathLimit::Open;
+        let mut loads = Vec::new();
+        for &(load, kind, ends_path) in searches {
+            direction = direction.after(&Found { critical: CriticalLoad { load, kind }, ends_path });
+            if direction == PathLimit::Reached {
+                break;
+            }
+            loads.push(load);
+        }
+        loads
+    }
+
+    #[test]
+    fn a_limit_point_that_is_reached_again_ends_the_list() {
+        use CriticalKind::{Branch, Limit};
+        assert_eq!(listed(&[(9.0, Limit, true), (9.0 + 1e-7, Limit, true), (9.0, Limit, true)]), [9.0]);
+        assert_eq!(listed(&[(7.0, Branch, false), (9.0, Limit, true), (9.0, Limit, true)]), [7.0, 9.0]);
+        // Steep bifurcations pass for limit points.
+        let steep = [(1.03, Limit, true), (1.05, Branch, false), (1.07, Limit, true)];
+        assert_eq!(listed(&steep), [1.03, 1.05, 1.07]);
+        assert_eq!(listed(&[(1.0, Limit, false), (1.0, Limit, false)]), [1.0, 1.0]);
+        assert_eq!(listed(&[(1.0, Branch, false), (1.0, Branch, false)]), [1.0, 1.0]);
     }
 }

@@ -41,7 +41,8 @@ pub(super) struct Dynamics<'s, 'r> {
     massive: Vec<bool>,
     /// The slots whose velocities enter no force: they have neither inertia nor damping.
     rateless: Vec<usize>,
-    /// Watches the energy of time steps; that of the full theory is not that of a linear stage.
+    /// Watches the energy of time steps; not in linear stages, whose account takes as long as their
+    /// steps.
     guard: Option<EnergyGuard>,
 }
 

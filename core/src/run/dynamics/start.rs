@@ -5,6 +5,7 @@ use super::Dynamics;
 use crate::integrate::Method;
 use crate::kernel::Weights;
 use crate::model::{LARGEST_GAP, Model, SlotKind, StageError};
+use crate::run::energy::Entry;
 use crate::run::failure::Failure;
 use crate::run::spatial::SpatialLook;
 use crate::run::stage_run::StageRun;
@@ -33,7 +34,8 @@ impl Dynamics<'_, '_> {
             increments.start(self.stage.state);
         }
         if begins {
-            self.stage.bookkeeper.bring_in(self.stage.model, self.stage.state);
+            let StageRun { bookkeeper, model, state, assembly, .. } = &mut *self.stage;
+            bookkeeper.bring_in(Entry::new(model, state, assembly));
         }
         self.stage.open_account()?;
         self.open_guard();

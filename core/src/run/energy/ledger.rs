@@ -1,7 +1,8 @@
 //! The energy account: what was stored, and the work that came in.
 
+use crate::effect::Energy;
 use crate::model::charts::HALF_TURN;
-use crate::model::{Model, SlotKind};
+use crate::model::{Assembly, LinearisedSystem, Model, SlotKind};
 use crate::rotation::{Rotation, log, unwound};
 use crate::system::{Category, DofMap, Slot, State, System};
 use crate::tensor::{Vec3, zeros};
@@ -28,6 +29,35 @@ impl Ledger {
     }
 }
 
+/// A converged state with its forces, as it is booked.
+#[derive(Clone, Copy)]
+pub struct Entry<'a> {
+    model: &'a Model,
+    state: &'a State,
+    system: &'a System,
+    /// The forces of a linear stage; `None` in other stages
+    linear: Option<&'a LinearisedSystem>,
+}
+
+impl<'a> Entry<'a> {
+    /// A state with its forces in `assembly`.
+    pub fn new(model: &'a Model, state: &'a State, assembly: &'a Assembly) -> Self {
+        Self { model, state, system: &assembly.system, linear: assembly.linear() }
+    }
+
+    fn energy(&self) -> Energy {
+        let internal = &self.system.force[Category::Internal as usize];
+        match self.linear {
+            None => self.model.energy(self.state),
+            Some(linear) => linear.energy(self.model, self.state, internal),
+        }
+    }
+
+    fn drives(&self) -> Vec<(f64, f64)> {
+        self.model.drives(self.state, self.linear.map(|linear| &linear.origin))
+    }
+}
+
 /// Keeps the account from step to step.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub struct Bookkeeper {
@@ -46,9 +76,9 @@ pub struct Bookkeeper {
 impl Bookkeeper {
     /// Initial motions have set a scene in motion, in a stage that is opened next: the kinetic
     /// energy that is new belongs to the account.
-    pub fn bring_in(&mut self, model: &Model, state: &State) {
+    pub fn bring_in(&mut self, entry: Entry) {
         if let Some(first) = &mut self.first {
-            *first += model.energy(state).kinetic - self.ledger.kinetic;
+            *first += entry.energy().kinetic - self.ledger.kinetic;
         }
     }
 
@@ -58,8 +88,9 @@ impl Bookkeeper {
     }
 
     /// Opens a stage: energies are taken, no work is added.
-    pub fn open(&mut self, model: &Model, state: &State, system: &System) {
-        self.drives = model.drives(state);
+    pub fn open(&mut self, entry: Entry) {
+        let Entry { state, system, .. } = entry;
+        self.drives = entry.drives();
         self.force = zeros(state.q.len());
         threads::each_part(&mut self.force, |start, part| {
             for (slot, force) in (start..).zip(part) {
@@ -68,22 +99,24 @@ impl Bookkeeper {
         });
         // Where nothing damps it is empty.
         threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
-        self.take(model, state);
+        self.take(entry);
         self.first.get_or_insert(self.ledger.total());
     }
 
     /// Adds the work of the step that ends here.
-    pub fn add_step(&mut self, model: &Model, state: &State, system: &System) {
+    pub fn add_step(&mut self, entry: Entry) {
+        let Entry { model, state, system, linear } = entry;
         let Self { ledger, q, unwrapped, force, drag, .. } = self;
-        let way = Way { kinds: &model.kinds, from: (q, unwrapped), to: (&state.q, &state.unwrapped) };
+        let (from, to) = ((&q[..], &unwrapped[..]), (&state.q[..], &state.unwrapped[..]));
+        let way = Way { kinds: &model.kinds, from, to, is_linear: linear.is_some() };
         ledger.external += way.work(force, |slot| outside(system, slot));
         ledger.damped += way.work(drag, |slot| system.part_of(Category::Damping, slot));
-        let drives = model.drives(state);
+        let drives = entry.drives();
         for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {
             ledger.external += 0.5 * (f0 + f1) * (x1 - x0);
         }
         self.drives = drives;
-        self.take(model, state);
+        self.take(entry);
     }
 
     /// Books the energy that an artificial resistance took on the way to a state of rest: all that
@@ -107,10 +140,10 @@ impl Bookkeeper {
     }
 
     /// Takes the energies of a state, and where it is.
-    fn take(&mut self, model: &Model, state: &State) {
-        threads::copy(&mut self.q, &state.q);
-        threads::copy(&mut self.unwrapped, &state.unwrapped);
-        let energy = model.energy(state);
+    fn take(&mut self, entry: Entry) {
+        threads::copy(&mut self.q, &entry.state.q);
+        threads::copy(&mut self.unwrapped, &entry.state.unwrapped);
+        let energy = entry.energy();
         (self.ledger.kinetic, self.ledger.strain) = (energy.kinetic, energy.strain);
         self.scale = self.scale.max(energy.kinetic + energy.strain).max(self.ledger.external.abs());
     }
@@ -122,6 +155,8 @@ struct Way<'a> {
     kinds: &'a [SlotKind],
     from: (&'a [Vec3], &'a [Vec3]),
     to: (&'a [Vec3], &'a [Vec3]),
+    /// True if forces are conjugate to the unknowns themselves, rotation vectors included
+    is_linear: bool,
 }
 
 impl Way<'_> {
@@ -134,7 +169,11 @@ impl Way<'_> {
                 let after = after(slot);
                 let before = put(before, after);
                 let unwrapped = *wound1.get(slot).unwrap_or(&q1[slot]) - *wound0.get(slot).unwrap_or(&q0[slot]);
-                sum += work(self.kinds[slot], (q0[slot], before), (q1[slot], after), unwrapped);
+                let kind = self.kinds[slot];
+                sum += match self.is_linear && !kind.is_multiplier() {
+                    true => straight_work(q0[slot], before, q1[slot], after),
+                    false => work(kind, (q0[slot], before), (q1[slot], after), unwrapped),
+                };
             }
             sum
         };
@@ -173,10 +212,15 @@ fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3), unwrappe
         return 0.0;
     }
     match kind {
-        SlotKind::Displacement => 0.5 * (f0 + f1).dot(q1 - q0),
+        SlotKind::Displacement => straight_work(q0, f0, q1, f1),
         SlotKind::Rotation => turning_work(q0, f0, q1, f1, unwrapped),
         SlotKind::Force | SlotKind::Moment => 0.0,
     }
+}
+
+/// Work of a force over the straight way of its unknown.
+fn straight_work(q0: Vec3, f0: Vec3, q1: Vec3, f1: Vec3) -> f64 {
+    0.5 * (f0 + f1).dot(q1 - q0)
 }
 
 /// Work of a moment over a rotation, in a form that no change of chart disturbs: with the spatial

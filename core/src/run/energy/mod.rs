@@ -4,5 +4,5 @@ mod guard;
 mod ledger;
 
 pub(super) use guard::{EnergyGuard, Growth, Imbalance, is_unbalanced};
-pub(super) use ledger::Bookkeeper;
 pub use ledger::Ledger;
+pub(super) use ledger::{Bookkeeper, Entry};

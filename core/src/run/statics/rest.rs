@@ -169,7 +169,7 @@ impl<'s, 'r> Descent<'s, 'r> {
             lifts = false;
             resistance *= EASIER;
             let moved = distance(self.stage.model, self.stage.good, self.stage.state);
-            self.stage.pass_through(&self.assembly.system)?;
+            self.stage.pass_through(&self.assembly)?;
             if distance(self.stage.model, &start, self.stage.good) > FARTHEST {
                 return Ok(false);
             }

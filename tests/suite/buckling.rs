@@ -1,0 +1,75 @@
+//! Critical loads on the paths of buckling stages: one row for each point.
+
+use beamsim::scene;
+use beamsim_core::run::{CriticalKind, CriticalLoad, Failure, Observer, Run, Snapshot, StageResult};
+use std::fs;
+use std::path::Path;
+
+#[derive(Default)]
+struct Loads(Vec<CriticalLoad>);
+
+impl Observer for Loads {
+    fn row(&mut self, _at: &Snapshot) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
+        if let StageResult::CriticalLoads(loads) = result {
+            self.0.clone_from(loads);
+        }
+        Ok(())
+    }
+}
+
+fn deck(path: &str) -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("decks").join(path)).unwrap()
+}
+
+fn critical_loads(text: &str) -> Vec<CriticalLoad> {
+    let (scene, _) = scene::from_text(text).unwrap_or_else(|found| panic!("{}\n{text}", found[0].message));
+    let mut loads = Loads::default();
+    Run::new(scene.plan, &mut loads).finish().0.unwrap();
+    loads.0
+}
+
+fn with_modes(text: &str, modes: usize) -> String {
+    let lines = text.lines().map(|line| match line.starts_with("modes = ") {
+        true => format!("modes = {modes}\n"),
+        false => format!("{line}\n"),
+    });
+    lines.collect()
+}
+
+/// Load control ends at a limit point: no other load lies behind it, however many are asked for.
+#[test]
+fn a_limit_point_is_listed_once() {
+    let frame = deck("hard/s13_buckling_limit_point.toml");
+    let [alone] = critical_loads(&with_modes(&frame, 1))[..] else { panic!("one load") };
+    assert_eq!(alone.kind, CriticalKind::Limit);
+    for modes in 2..=4 {
+        let [found] = critical_loads(&with_modes(&frame, modes))[..] else { panic!("one load of {modes}") };
+        assert_eq!(found.kind, CriticalKind::Limit);
+        assert!((found.load / alone.load - 1.0).abs() < 1e-7, "{} and {}", found.load, alone.load);
+    }
+}
+
+/// A higher frame turns aside before its limit point.
+#[test]
+fn branches_before_a_limit_point_are_listed_with_it() {
+    let frame = deck("hard/s13_buckling_limit_point.toml").replace("b = [0, 0, 0.3]", "b = [0, 0, 0.6]");
+    let found = critical_loads(&with_modes(&frame, 4));
+    let kinds: Vec<CriticalKind> = found.iter().map(|critical| critical.kind).collect();
+    let (last, before) = kinds.split_last().unwrap();
+    assert_eq!(*last, CriticalKind::Limit, "{found:?}");
+    assert!(!before.is_empty() && before.iter().all(|kind| *kind == CriticalKind::Branch), "{found:?}");
+    assert!(found.windows(2).all(|pair| pair[0].load < pair[1].load * (1.0 - 1e-6)), "{found:?}");
+}
+
+/// Two modes at one load are two rows.
+#[test]
+fn double_branches_are_listed_twice() {
+    let found = critical_loads(&deck("paths/euler_columns/pinned_round.toml"));
+    let [one, other] = found[..] else { panic!("{found:?}") };
+    assert!((one.load / other.load - 1.0).abs() < 1e-5);
+    assert_eq!([one.kind, other.kind], [CriticalKind::Branch; 2]);
+}
