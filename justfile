@@ -19,6 +19,10 @@ test:
 test-one NAME:
     cargo test --release --test suite {{NAME}}
 
+# Read, check and run many wrong and odd inputs (docs/reliability.md)
+fuzz SEED='1' INPUTS='1000000' RUNS='10000':
+    cargo test --release --locked --test fuzz -- --seed {{SEED}} --inputs {{INPUTS}} --runs {{RUNS}}
+
 # Compile everything and run the unit tests in src/ and core/src/
 quick:
     cargo check --all-targets

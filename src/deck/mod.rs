@@ -141,7 +141,7 @@ const KEYS: [&str; 23] = [
 pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
     let (document, syntax) = DeTable::parse_recoverable(text);
     if !syntax.is_empty() {
-        return Err(describe_syntax(&syntax));
+        return Err(describe_syntax(text, &syntax));
     }
     let mut diagnostics = Vec::new();
     let parameters = match document.get_ref().get("param").map(|item| (item, item.get_ref())) {
@@ -166,14 +166,31 @@ pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
 
 /// The first syntax error, and keys that stand twice; the parser's other errors are mostly
 /// consequences of the first.
-fn describe_syntax(errors: &[toml::de::Error]) -> Vec<Diagnostic> {
+fn describe_syntax(text: &str, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
     let describe = |error: &toml::de::Error| {
+        // The parser does not say which key it is.
+        if error.span().is_none() && error.message() == "recursion limit" {
+            return Diagnostic::error("this key has too many parts: at most 80 are supported", longest_key(text));
+        }
         let mut diagnostic = Diagnostic::whole(error.message().trim().replace('\n', "; "));
         diagnostic.span = error.span();
         diagnostic
     };
     let twice = |error: &toml::de::Error| error.message().contains("duplicate key");
     errors.iter().enumerate().filter(|(k, error)| *k == 0 || twice(error)).map(|(_, error)| describe(error)).collect()
+}
+
+/// The place of the key with the most dots.
+fn longest_key(text: &str) -> Span {
+    const ENDS: [char; 7] = ['\n', ',', '=', '[', ']', '{', '}'];
+    let mut start = 0;
+    let place = |piece: &str| {
+        let own = start..start + piece.trim_end_matches(ENDS).trim_end().len();
+        start += piece.len();
+        own
+    };
+    let pieces = text.split_inclusive(ENDS).map(place);
+    pieces.max_by_key(|piece| text[piece.clone()].matches('.').count()).unwrap_or(0..0)
 }
 
 fn read_tables(context: &Context, document: &DeTable) -> Deck {

@@ -73,7 +73,7 @@ impl SweepFile {
     pub fn read(text: &str) -> Result<Self, Vec<Diagnostic>> {
         let (document, syntax) = DeTable::parse_recoverable(text);
         if !syntax.is_empty() {
-            return Err(super::describe_syntax(&syntax));
+            return Err(super::describe_syntax(text, &syntax));
         }
         let context = Context {
             parameters: Parameters::default(),
