@@ -7,8 +7,8 @@ use super::simulate::RunExtras;
 use super::thread_count::cores;
 use super::variant::{describe, paste_lines};
 use super::{console, load, signals};
-use crate::deck::{Accuracy, Deck};
-use crate::output::{Film, ReachedAccuracy, ReachedColumn};
+use crate::deck::{self, Accuracy, Deck};
+use crate::output::{DeckSource, Film, ReachedAccuracy, ReachedColumn};
 use crate::scene::Scene;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{Journal, StudyOptions};
@@ -75,7 +75,9 @@ impl RunArguments {
         print_found(name, &loaded.deck, &found, &wanted);
         let accuracy = reached(&found, &wanted, start.elapsed());
         // The text in memory is used, since the file may have changed in the meantime.
-        let loaded = load::again(path, &loaded.text, &found.settings())?;
+        let settled = load::again(path, &loaded.text, &found.settings())?;
+        let text = deck::apply(&loaded.source.text, &found.settings()).map_err(CommandError::deck)?;
+        let loaded = Loaded { source: DeckSource { text, ..loaded.source }, ..settled };
         let missed = (!found.reached).then(|| missed(&found, &wanted));
         let prepared = self.with_bars(path, loaded, Some(accuracy), found.outcome.take())?;
         Ok(PreparedRun { missed, ..prepared })
@@ -93,7 +95,7 @@ impl RunArguments {
             note_polylines(&loaded.deck);
         }
         let film = self.report.then(|| Film::of(&loaded.scene));
-        let extras = RunExtras { accuracy, outcome, bars, text: loaded.text, film };
+        let extras = RunExtras { accuracy, outcome, bars, source: loaded.source, film };
         Ok(PreparedRun { scene: loaded.scene, missed: None, extras })
     }
 

@@ -7,7 +7,7 @@ use super::simulate::{Finished, simulate};
 use super::status::Status;
 use super::thread_count::{on_threads, threads_of};
 use super::verdict::Verdict;
-use super::{console, json, load, report, signals};
+use super::{console, json, load, outputs, report, signals};
 use crate::scene::Scene;
 use beamsim_core::run::Failure;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,8 @@ pub fn run(decks: &[PathBuf], settings: &[String], wanted: &RunArguments, out: O
     for (number, path) in decks.iter().enumerate() {
         let name = load::name(path);
         let folder = folder(out, &name, decks.len() > 1);
-        match wanted.prepare(&name, path, settings) {
+        let is_free = outputs::check_folder(&folder, &outputs::OF_RUN);
+        match is_free.and_then(|()| wanted.prepare(&name, path, settings)) {
             Ok(prepared) => run_one(&name, path, prepared, wanted, &folder, &mut verdict),
             Err(error) => verdict.fail(error),
         }

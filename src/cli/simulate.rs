@@ -5,8 +5,8 @@ use super::console;
 use super::progress::Progress;
 use super::signals;
 use crate::output::{
-    FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, PartFile, ReachedAccuracy, Record, Row,
-    RowCounter, Rows, SideColumns, Units, remove_fields, remove_if_there,
+    DeckSource, FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, PartFile, ReachedAccuracy,
+    Record, Row, RowCounter, Rows, SideColumns, Units, remove_fields, remove_if_there,
 };
 use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
@@ -26,8 +26,8 @@ pub struct RunExtras {
     pub outcome: Option<study::Outcome>,
     /// Error bars
     pub bars: Option<ErrorBars>,
-    /// The text of the deck
-    pub text: String,
+    /// The deck
+    pub source: DeckSource,
     /// Recorder of shapes for the report
     pub film: Option<Film>,
 }
@@ -61,7 +61,7 @@ pub fn simulate(
     let start = Instant::now();
     // From here on the run itself answers signals.
     signals::caught();
-    let RunExtras { accuracy, outcome, bars, text, film } = extras;
+    let RunExtras { accuracy, outcome, bars, source, film } = extras;
     let opened = folder.map(|folder| open(scene, folder, bars)).transpose();
     let (writers, opened) = match opened {
         Ok(writers) => (writers, Ok(())),
@@ -94,7 +94,7 @@ pub fn simulate(
     let seconds = seconds_of_search.unwrap_or_else(|| start.elapsed().as_secs_f64());
     let mut record = None;
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
-        let run = FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, text };
+        let run = FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, source };
         let content = Record::of(scene, run);
         let writers = Writers { history, fields: watcher.fields.take() };
         let written = write_results(writers, &watcher.modes, folder, result.is_ok(), &content);

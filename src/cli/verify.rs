@@ -7,7 +7,7 @@ use super::simulate::{RunExtras, simulate};
 use super::status::Status;
 use super::thread_count::threads_of;
 use super::verdict::Verdict;
-use super::{console, json, signals};
+use super::{console, json, outputs, signals};
 use crate::output::OutputError;
 use crate::study::{Judgement, Recorder, expected_failure, judge};
 use std::path::{Path, PathBuf};
@@ -53,7 +53,10 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
 
 /// Runs a deck and judges its expectations; a deck that cannot be read may be expected to fail.
 fn one(path: &Path, name: &str, settings: &[String], folder: Option<&Path>) -> Result<Vec<Judgement>, CommandError> {
-    let Loaded { text, scene, .. } = match load::deck(path, settings) {
+    if let Some(folder) = folder {
+        outputs::check_folder(folder, &outputs::OF_RUN)?;
+    }
+    let Loaded { source, scene, .. } = match load::deck(path, settings) {
         Ok(loaded) => loaded,
         Err(CommandError::Deck(error)) if !error.expected.is_empty() => {
             let expected = error.expected.clone();
@@ -65,7 +68,7 @@ fn one(path: &Path, name: &str, settings: &[String], folder: Option<&Path>) -> R
         Err(error) => return Err(error),
     };
     let mut recorder = Recorder::new(&scene);
-    let extras = RunExtras { text, ..RunExtras::default() };
+    let extras = RunExtras { source, ..RunExtras::default() };
     let finished = simulate(&scene, name, folder, Some(&mut recorder), extras, threads_of(&scene, None));
     if let Some(signal) = signals::caught() {
         return Err(CommandError::Stopped { signal, message: format!("stopped by signal {signal}") });

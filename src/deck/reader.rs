@@ -231,7 +231,8 @@ impl<'a> Table<'a> {
                 let list = || format!("keys of {}: {}", self.what, one_of(keys.iter().copied()));
                 let message = format!("unknown key `{name}` in {}", self.what);
                 let help = hint.help().unwrap_or_else(list);
-                self.context.report(Diagnostic::error(message, key.span()).help(help));
+                let error = Diagnostic::error(message, key.span()).help(help);
+                self.context.report(Diagnostic { is_of_key: true, ..error });
             }
         }
     }

@@ -23,6 +23,14 @@ pub enum OutputError {
         /// The error in the content
         reason: String,
     },
+    /// A path at which something stands that is not replaced.
+    #[error("{} {reason}", path.display())]
+    Occupied {
+        /// The path
+        path: PathBuf,
+        /// What stands there, and what to do
+        reason: String,
+    },
     /// A path that ends in no file name, such as `..`.
     #[error("{}: not a file name", .0.display())]
     NoFileName(PathBuf),

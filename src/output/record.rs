@@ -2,6 +2,7 @@
 
 use super::json::{Entries, Number};
 use super::{OutputError, Units};
+use crate::deck::{self, ImportedTable};
 use crate::scene::{Reason, Scene};
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt::{self, Display, Formatter};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A run that has ended.
 pub struct FinishedRun<'a> {
@@ -23,8 +24,27 @@ pub struct FinishedRun<'a> {
     pub threads: usize,
     /// The wanted accuracy and how far it was reached
     pub accuracy: Option<ReachedAccuracy>,
-    /// The text of the deck
+    /// The deck
+    pub source: DeckSource,
+}
+
+/// The text of a deck, and the long tables beside it. Their rows are not repeated in run.json: a
+/// report reads them from their files, and finds by the fingerprint if they have changed.
+#[derive(Clone, Debug, Default)]
+pub struct DeckSource {
+    /// The text, with the settings of the command line and the rows of short tables
     pub text: String,
+    /// The long tables
+    pub tables: Vec<TableSource>,
+}
+
+/// A table beside a deck.
+#[derive(Clone, Debug)]
+pub struct TableSource {
+    /// The path of its file
+    pub path: PathBuf,
+    /// Its name in the deck, rows and fingerprint
+    pub table: ImportedTable,
 }
 
 /// A wanted accuracy, and what was reached.
@@ -60,8 +80,25 @@ pub struct Record {
     deck: Value,
     #[serde(skip_serializing_if = "Option::is_none")]
     text: Option<String>,
+    /// The tables beside the deck whose rows are not in its text
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    tables: Vec<TableRecord>,
     #[serde(flatten)]
     findings: Findings,
+}
+
+/// A table beside the deck.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct TableRecord {
+    /// Its name in the deck
+    pub csv: String,
+    /// The path of its file; not UTF-8 characters are replaced
+    pub path: String,
+    /// The number of its rows
+    pub rows: usize,
+    /// A fingerprint of its file
+    pub hash: String,
 }
 
 /// The part of run.json that does not repeat the deck.
@@ -223,7 +260,7 @@ impl<'a> RunSummary<'a> {
 impl Record {
     /// The record of a run.
     pub fn of(scene: &Scene, run: FinishedRun) -> Self {
-        let FinishedRun { result, counters, seconds, threads, accuracy, text } = run;
+        let FinishedRun { result, counters, seconds, threads, accuracy, source } = run;
         let found = &counters.findings;
         let warnings = scene.warnings.iter().chain(&found.warnings);
         let findings = Findings {
@@ -245,8 +282,9 @@ impl Record {
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             status: result.as_ref().map_or_else(Failure::name, |()| "finished").into(),
-            deck: scene.resolved.clone(),
-            text: Some(text),
+            deck: resolved(&source).unwrap_or_else(|| scene.resolved.clone()),
+            tables: source.tables.iter().map(TableRecord::from).collect(),
+            text: Some(source.text),
             findings,
         }
     }
@@ -261,6 +299,11 @@ impl Record {
     /// The text of the deck.
     pub fn text(&self) -> Option<&str> {
         self.text.as_deref()
+    }
+
+    /// The tables beside the deck.
+    pub fn tables(&self) -> &[TableRecord] {
+        &self.tables
     }
 
     /// The title of the deck.
@@ -281,6 +324,23 @@ impl Record {
     /// The record without the text of the deck.
     pub fn bare(&self) -> Self {
         Self { text: None, ..self.clone() }
+    }
+}
+
+/// The tables of a deck with numbers for expressions, and without the rows of long tables; `None` if
+/// it imports none.
+fn resolved(source: &DeckSource) -> Option<Value> {
+    if source.tables.is_empty() {
+        return None;
+    }
+    // Readers complain of names of files, which they do not know.
+    deck::read(&source.text).ok().map(|(deck, _)| deck.resolved)
+}
+
+impl From<&TableSource> for TableRecord {
+    fn from(source: &TableSource) -> Self {
+        let ImportedTable { name, rows, hash } = &source.table;
+        Self { csv: name.clone(), path: source.path.display().to_string(), rows: *rows, hash: hash.clone() }
     }
 }
 
@@ -470,7 +530,7 @@ mod tests {
 
     const RECORD: &str = r#"{
         "version": "0.1.0", "status": "singular", "deck": { "param": { "L": 1.0 }, "beam": [{ "elements": 4 }] },
-        "text": "a deck", "effects": [{ "name": "shear", "active": true, "reason": "GA" }],
+        "text": "a deck", "tables": [{ "csv": "f.csv", "path": "/a/f.csv", "rows": 2, "hash": "fnv1a:00" }], "effects": [{ "name": "shear", "active": true, "reason": "GA" }],
         "counters": {
             "steps": 1, "cutbacks": 0, "uncertainty": 1e-12, "iterations": 3, "factorisations": 3,
             "chart_switches": 0, "mixed_elements": 0, "evaluations": { "z": 2, "a": 1 },
