@@ -209,6 +209,16 @@ fn finite(value: Jet, offset: usize, operation: impl Fn() -> String) -> Result<J
     Err(ExpressionError { message: format!("`{}` {is}", operation()), offset })
 }
 
+/// An expression for messages: of a long one the beginning.
+pub fn shortened(text: &str) -> String {
+    /// Characters in a message, at most.
+    const MOST: usize = 60;
+    match text.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.into(),
+    }
+}
+
 /// A number for messages: with an exponent where that is shorter.
 fn short(value: f64) -> String {
     let text = format!("{value:?}");

@@ -21,7 +21,7 @@ pub fn run_all(plan: &Plan, points: &[usize], wanted: &SweepArguments) -> Result
     if !suspects.is_empty() {
         let name = &plan.name;
         let count = suspects.len();
-        console::note(&format!("{name}: {count} point(s) were running when a process died; each is run again alone"));
+        console::note(&format!("{name}: {count} point(s) of a process that died: each is run again alone"));
     }
     for &point in &suspects {
         if signals::caught().is_some() {
