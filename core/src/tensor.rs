@@ -91,8 +91,21 @@ impl Vec3<f64> {
 
     /// The vector of length one in this direction; `None` for a vector without one.
     pub fn normalized(self) -> Option<Self> {
+        // Beyond these lengths squares of components overflow or vanish.
+        const SHORTEST: f64 = 1e-150;
+        const LONGEST: f64 = 1e150;
+        let of_length = |vector: Self, length: f64| vector * (1.0 / length);
         let length = self.norm();
-        (length > 0.0 && length.is_finite()).then(|| self * (1.0 / length))
+        if (SHORTEST..=LONGEST).contains(&length) {
+            return Some(of_length(self, length));
+        }
+        let largest = self.max_abs();
+        if !(largest > 0.0 && largest.is_finite()) {
+            return None;
+        }
+        // Dividing twice: the inverse of a very small number is infinite.
+        let scaled = Self(self.0.map(|component| component / largest));
+        Some(of_length(scaled, scaled.norm()))
     }
 
     /// The largest magnitude among the components; NaN if one is.
@@ -391,5 +404,14 @@ mod tests {
         assert_eq!(Vec3::ZERO.size(), 0.0);
         assert!(Vec3([1.0, f64::NAN, 2.0]).size().is_nan());
         assert!(Vec3([f64::INFINITY, 0.0, 0.0]).size().is_infinite());
+    }
+    #[test]
+    fn directions_neither_underflow_nor_overflow() {
+        for size in [5e-324, 1e-200, 1.0, 1e200, 1.7e308] {
+            assert_eq!(Vec3([0.0, -size, 0.0]).normalized(), Some(Vec3([0.0, -1.0, 0.0])), "{size:e}");
+        }
+        for none in [Vec3::ZERO, Vec3([f64::INFINITY, 0.0, 0.0]), Vec3([f64::NAN, 1.0, 0.0])] {
+            assert_eq!(none.normalized(), None);
+        }
     }
 }

@@ -8,8 +8,8 @@ use super::simulate::{RunExtras, Target};
 use super::thread_count::cores;
 use super::variant::{describe, paste_lines};
 use super::{console, load, signals};
-use crate::deck::{Accuracy, Deck};
-use crate::output::{Film, ReachedAccuracy, ReachedColumn, ResultFolder};
+use crate::deck::{self, Accuracy, Deck};
+use crate::output::{DeckSource, Film, ReachedAccuracy, ReachedColumn, ResultFolder};
 use crate::scene::Scene;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{Journal, StudyOptions};
@@ -92,7 +92,9 @@ impl RunArguments {
         print_found(name, &loaded.deck, &found, &wanted);
         let accuracy = Some(reached(&found, &wanted, start.elapsed()));
         // The text in memory is used, since the file may have changed in the meantime.
-        let loaded = load::again(path, &loaded.text, &found.settings())?;
+        let settled = load::again(path, &loaded.text, &found.settings())?;
+        let text = deck::apply(&loaded.source.text, &found.settings()).map_err(CommandError::deck)?;
+        let loaded = Loaded { source: DeckSource { text, ..loaded.source }, ..settled };
         let missed = (!found.reached).then(|| missed(&found, &wanted));
         Ok(Chosen { loaded, accuracy, outcome: found.outcome.take(), missed })
     }
@@ -111,7 +113,7 @@ impl RunArguments {
             Some(reel) => Some(Film::resume(&loaded.scene, reel)),
             None => self.report.then(|| Film::of(&loaded.scene)),
         };
-        Ok((loaded.scene, RunExtras { accuracy, outcome, bars, text: loaded.text, film }))
+        Ok((loaded.scene, RunExtras { accuracy, outcome, bars, source: loaded.source, film }))
     }
 
     fn search(

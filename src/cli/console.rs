@@ -1,10 +1,13 @@
-//! Printing. Errors of a closed pipe are ignored.
+//! Printing: the only place that writes to the terminal. Texts of users are escaped, so that no deck
+//! and no file name controls the terminal or forges a line.
 
+use crate::deck::{hides_text, shown, shown_in_line};
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 use std::io::{self, IsTerminal, Write};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -70,20 +73,21 @@ pub fn warnings() -> usize {
 /// Prints a line for people on standard output.
 pub fn line(text: &str) {
     if !options().quiet && !options().json {
-        answer(text);
+        print(&shown_in_line(text));
     }
 }
 
-/// Prints a line for scripts on standard output.
-pub fn data(text: &str) {
+/// Prints a line of JSON for scripts on standard output.
+pub fn data(json: &str) {
     if options().json {
-        answer(text);
+        print(&escaped_json(json));
     }
 }
 
-/// Prints the answer of a command on standard output, whatever the options.
+/// Prints the answer of a command on standard output, whatever the options. It may have several
+/// lines.
 pub fn answer(text: &str) {
-    write_to(&mut io::stdout().lock(), text);
+    print(&shown(text));
 }
 
 /// Prints a remark on standard error, unless `--quiet` is given.
@@ -95,7 +99,17 @@ pub fn remark(text: &str) {
 
 /// Prints a line on standard error.
 pub fn note(text: &str) {
-    write_to(&mut io::stderr().lock(), text);
+    write_to_stderr(&shown_in_line(text));
+}
+
+/// Prints several lines on standard error.
+pub fn notes(text: &str) {
+    write_to_stderr(&shown(text));
+}
+
+/// Prints messages about a deck on standard error: they are escaped, and may be coloured.
+pub fn diagnostics(rendered: &str) {
+    write_to_stderr(rendered);
 }
 
 /// Prints the last line on standard error, with the name of the failure.
@@ -103,14 +117,59 @@ pub fn error(name: &str, message: &str) {
     note(&format!("error[{name}]: {message}"));
 }
 
+/// JSON with characters that would control a terminal as escapes of JSON. They occur in its texts
+/// only.
+fn escaped_json(json: &str) -> String {
+    let mut out = String::with_capacity(json.len());
+    for c in json.chars() {
+        if c.is_control() || hides_text(c) {
+            // All of them have at most 16 bits.
+            let _ = write!(out, "\\u{:04x}", u32::from(c));
+        } else {
+            out.push(c);
+        }
+    }
+    out
+}
+
 /// True where messages may be coloured.
 pub fn styled() -> bool {
     io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
 }
 
-/// Writes a line. Errors are ignored: nobody reads a closed pipe.
-fn write_to(out: &mut dyn Write, text: &str) {
-    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+/// The first error of standard output, except that nobody reads it any more.
+static STDOUT_ERROR: Mutex<Option<io::Error>> = Mutex::new(None);
+
+/// Writes a line to standard output. The first error is kept for the end of the command; after it,
+/// and after the other end of a pipe was closed, nothing more is written.
+fn print(text: &str) {
+    static IS_CLOSED: AtomicBool = AtomicBool::new(false);
+    if IS_CLOSED.load(Ordering::Relaxed) {
+        return;
+    }
+    if let Err(error) = write_line(&mut io::stdout().lock(), text) {
+        IS_CLOSED.store(true, Ordering::Relaxed);
+        if error.kind() != io::ErrorKind::BrokenPipe {
+            *STDOUT_ERROR.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+        }
+    }
+}
+
+/// The error of standard output, if it could not take everything. A reader that stops early, such as
+/// `head`, is none.
+pub fn stdout_error() -> Option<io::Error> {
+    STDOUT_ERROR.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
+/// Writes a line to standard error. There is no other place to tell its errors.
+fn write_to_stderr(text: &str) {
+    let _ = write_line(&mut io::stderr().lock(), text);
+}
+
+fn write_line(out: &mut dyn Write, text: &str) -> io::Result<()> {
+    // One write: lines of several processes stay whole.
+    out.write_all(format!("{text}\n").as_bytes())?;
+    out.flush()
 }
 
 /// A measured time with three digits: 1.30 ms, 2.50 s.
@@ -150,4 +209,29 @@ pub fn duration(text: &str) -> Result<Duration, String> {
         return Err("a time must be between 0 and 100 years".into());
     }
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_stays_json_and_controls_no_terminal() {
+        let json = escaped_json("[\"a\u{9b}2J\", \"\u{202e}b\u{7f}\", \"plain é\\n\"]");
+        assert_eq!(json, "[\"a\\u009b2J\", \"\\u202eb\\u007f\", \"plain é\\n\"]");
+    }
+
+    #[test]
+    fn a_full_device_is_an_error() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                Err(io::ErrorKind::StorageFull.into())
+            }
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        assert!(write_line(&mut Full, "text").is_err());
+    }
 }

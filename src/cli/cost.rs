@@ -9,9 +9,9 @@ use super::status::Status;
 use super::thread_count::cores;
 use super::variant::{describe, paste_lines};
 use super::verdict::Verdict;
-use super::{console, json, load, signals};
+use super::{console, json, load, outputs, signals};
 use crate::deck::Accuracy;
-use crate::output::{Axis, HistoryReader, Level, Line, LinePlot, LineStyle, OutputError, PartFile, Scale};
+use crate::output::{Axis, HistoryReader, Level, Line, LinePlot, LineStyle, OutputError, OutputKind, PartFile, Scale};
 use crate::study::cost::{
     Against, CostRun, CostStudy, Expected, Family, Journal, Limit, Order, Orders, StudyOptions, study,
 };
@@ -95,6 +95,7 @@ fn setting(vary: &str) -> String {
 }
 
 fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &CostArguments, folder: &Path) -> Result<(), CommandError> {
+    outputs::check_folder(folder, &[("cost.csv", OutputKind::Cost), ("cost.svg", OutputKind::Svg)])?;
     let (against, given) = reference(wanted.reference.as_deref())?;
     let identity = format!("beamsim {}\n{given}\n{}", env!("CARGO_PKG_VERSION"), loaded.text);
     // A signal stops the study, and the journal has the runs that are done.
@@ -138,6 +139,9 @@ fn reference(word: Option<&Path>) -> Result<(Against, String), CommandError> {
         Some(word) if word.as_os_str() == "expect" => Ok((Against::Expectations, "expect".into())),
         Some(path) => {
             let table = HistoryReader::read(path)?;
+            if let Some(why) = table.first_not_finite() {
+                return Err(CommandError::Usage(format!("--reference {}: {why}", path.display())));
+            }
             let identity = format!("{table:?}");
             Ok((Against::Table(table), identity))
         }

@@ -5,9 +5,9 @@ use super::folders::{check_names, folder};
 use super::load::{self, Loaded};
 use super::status::Status;
 use super::verdict::Verdict;
-use super::{console, json, signals};
+use super::{console, json, outputs, signals};
 use crate::deck::EffectWord;
-use crate::output::{OutputError, PartFile};
+use crate::output::{OutputError, OutputKind, PartFile};
 use crate::study::effects::{EffectStudy, ReducedScene, study_effects};
 use std::path::{Path, PathBuf};
 
@@ -36,6 +36,7 @@ fn check_tolerance(tolerance: f64) -> Result<(), CommandError> {
 }
 
 fn one(name: &str, path: &Path, settings: &[String], tolerance: f64, folder: &Path) -> Result<(), CommandError> {
+    outputs::check_folder(folder, &[("effects.csv", OutputKind::Effects)])?;
     let Loaded { deck, scene, .. } = load::deck(path, settings)?;
     let mut progress = |what: &str| console::note(&format!("{name}: {what}"));
     let found = study_effects(&deck, &scene, tolerance, &signals::caught, &mut progress)?;

@@ -66,10 +66,33 @@ pub struct DeckError {
     pub message: String,
     /// The errors with their lines of the deck; empty where there is nothing to show
     pub details: String,
-    /// True if the deck only exceeds supported limits
-    pub is_limit: bool,
+    /// The kind of error
+    pub fault: DeckFault,
     /// Failures that the deck itself expects
     pub expected: Vec<String>,
+}
+
+/// Kinds of errors of a deck.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DeckFault {
+    /// Its text is wrong.
+    #[default]
+    Text,
+    /// It only exceeds supported limits.
+    Limit,
+    /// A file that it names could not be read.
+    File,
+}
+
+impl DeckFault {
+    /// The kind of failure that it is.
+    fn kind(self) -> FailureKind {
+        match self {
+            Self::Text => FailureKind::Deck,
+            Self::Limit => FailureKind::Limit,
+            Self::File => FailureKind::Io,
+        }
+    }
 }
 
 impl CommandError {
@@ -80,7 +103,7 @@ impl CommandError {
 
     /// A deck or file that exceeds a supported limit.
     pub fn limit(message: String) -> Self {
-        Self::Deck(DeckError { message, is_limit: true, ..DeckError::default() })
+        Self::Deck(DeckError { message, fault: DeckFault::Limit, ..DeckError::default() })
     }
 
     /// A file that could not be read or written; the message of the error names it.
@@ -92,8 +115,7 @@ impl CommandError {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Usage(_) => "usage",
-            Self::Deck(error) if error.is_limit => FailureKind::Limit.name(),
-            Self::Deck(_) => FailureKind::Deck.name(),
+            Self::Deck(error) => error.fault.kind().name(),
             Self::Io(_) => FailureKind::Io.name(),
             Self::Locked(_) => "locked",
             Self::Checkpoint(_) => "checkpoint",
@@ -109,7 +131,8 @@ impl CommandError {
     /// The exit status.
     pub fn status(&self) -> Status {
         match self {
-            Self::Usage(_) | Self::Deck(_) | Self::Checkpoint(_) => Status::Wrong,
+            Self::Usage(_) | Self::Checkpoint(_) => Status::Wrong,
+            Self::Deck(error) => Status::of(error.fault.kind()),
             Self::Io(_) | Self::Locked(_) => Status::Io,
             Self::Run(failure) | Self::SearchStopped { by: failure, .. } => Status::of_failure(failure),
             Self::Stopped { signal, .. } => Status::after(*signal),
@@ -159,8 +182,9 @@ impl From<StudyError> for CommandError {
         match error {
             StudyError::Failure(failure) => Self::Run(failure),
             StudyError::Output(error) => Self::io(error),
+            StudyError::NoScene { message, kind: FailureKind::Limit } => Self::limit(message),
             StudyError::Deck(_)
-            | StudyError::NoScene(_)
+            | StudyError::NoScene { .. }
             | StudyError::OtherOutputs
             | StudyError::Comparison(_)
             | StudyError::Sweep(_) => Self::deck(error),

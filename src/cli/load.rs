@@ -1,21 +1,35 @@
 //! From the path of a deck to a scene, with the messages about it.
 
 use super::console;
-use super::error::{CommandError, DeckError};
-use crate::deck::{self, Deck, Diagnostic, ExpectBody, Severity, SweepFile, Words};
-use crate::output::OutputError;
+use super::error::{CommandError, DeckError, DeckFault};
+use crate::deck::{
+    self, Deck, Diagnostic, ExpectBody, Imported, ImportedTable, Severity, SweepFile, Unreadable, Words,
+};
+use crate::output::{DeckSource, OutputError, TableSource};
 use crate::scene::{self, Scene};
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The largest deck that is read, in bytes.
 const LARGEST_DECK: u64 = 64 << 20;
 
+/// Most lines and entries of lists in a deck. Reading takes some 100 bytes for each of them.
+const MOST_PARTS: usize = 2_000_000;
+
+/// Rows of a table beside a deck that are stored in run.json, at most; of longer tables run.json
+/// keeps path and fingerprint.
+const MOST_STORED_ROWS: usize = 1000;
+
+/// Most messages about a deck that are shown.
+const MOST_MESSAGES: usize = 50;
+
 /// A deck that was read.
 pub struct Loaded {
-    /// Its text, with the settings of the command line
+    /// Its text, with the settings of the command line and the rows of imported tables
     pub text: String,
+    /// What run.json keeps of the text
+    pub source: DeckSource,
     /// The deck as it stands in the text
     pub deck: Deck,
     /// The scene
@@ -24,7 +38,7 @@ pub struct Loaded {
 
 /// Reads a deck and builds its scene; warnings are shown, errors returned, all at once.
 pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, CommandError> {
-    again(path, &text(path)?, settings)
+    again(path, &deck_text(path)?, settings)
 }
 
 /// Reads the text of a deck that comes from a file, and builds its scene.
@@ -41,11 +55,13 @@ pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Comm
         CommandError::Deck(DeckError {
             message: count_of_errors(errors.len(), path),
             details: render(&label, text, found),
-            is_limit: errors.iter().all(|d| d.severity == Severity::Limit),
+            fault: fault(&errors),
             expected,
         })
     };
-    let text = deck::import(&text, &|name| beside(path, name)).map_err(|found| refuse(&text, &found, Vec::new()))?;
+    let own = text;
+    let imported = deck::import(&own, &|name| beside(path, name));
+    let Imported { text, tables } = imported.map_err(|found| refuse(&own, &found, Vec::new()))?;
     let (deck, found) = deck::read(&text).map_err(|found| refuse(&text, &found, Vec::new()))?;
     let built = scene::from_deck(&deck, found);
     let (scene, warnings) = built.map_err(|found| refuse(&text, &found, expected_failures(&deck)))?;
@@ -59,9 +75,35 @@ pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Comm
     }
     let new: Vec<Diagnostic> = warnings.into_iter().filter(|warning| console::is_new(path, &warning.message)).collect();
     if !new.is_empty() {
-        console::note(&render(&label, &text, &new));
+        console::diagnostics(&render(&label, &text, &new));
     }
-    Ok(Loaded { text, deck, scene })
+    let source = source(path, &own, &text, tables);
+    Ok(Loaded { text, source, deck, scene })
+}
+
+/// What run.json keeps of a deck: its text with the rows of short tables, and where long ones are.
+fn source(path: &Path, own: &str, text: &str, mut tables: Vec<ImportedTable>) -> DeckSource {
+    tables.retain(|table| table.rows > MOST_STORED_ROWS);
+    let text = if tables.is_empty() {
+        text.into()
+    } else {
+        let imported = deck::import_up_to(MOST_STORED_ROWS, own, &|name| beside(path, name));
+        imported.map_or(own.into(), |imported| imported.text)
+    };
+    let tables = tables.into_iter().map(|table| TableSource { path: absolute_path(path, &table.name), table });
+    DeckSource { text, tables: tables.collect() }
+}
+
+/// The kind of the errors of a deck, if all are of one kind.
+fn fault(errors: &[&Diagnostic]) -> DeckFault {
+    let all = |severity: Severity| errors.iter().all(|error| error.severity == severity);
+    if all(Severity::Limit) {
+        DeckFault::Limit
+    } else if all(Severity::File) {
+        DeckFault::File
+    } else {
+        DeckFault::Text
+    }
 }
 
 /// `2 errors in arm.toml`
@@ -76,10 +118,68 @@ fn sweep_as_deck(path: &Path) -> CommandError {
     CommandError::deck(format!("{name} is a sweep file, not a deck: try `beamsim sweep {name}`"))
 }
 
-/// The text of a table that a deck names by a path relative to the folder of the deck.
-fn beside(deck: &Path, name: &str) -> Result<String, String> {
-    let folder = deck.parent().unwrap_or(Path::new(""));
-    text(&folder.join(name)).map_err(|error| error.to_string())
+/// The path of a table that a deck names, relative to the folder of the deck.
+fn path_beside(deck: &Path, name: &str) -> PathBuf {
+    deck.parent().unwrap_or(Path::new("")).join(name)
+}
+
+/// The absolute path of a table that a deck names.
+fn absolute_path(deck: &Path, name: &str) -> PathBuf {
+    let path = path_beside(deck, name);
+    std::fs::canonicalize(&path).or_else(|_| std::path::absolute(&path)).unwrap_or(path)
+}
+
+/// The text of a table that a deck names.
+fn beside(deck: &Path, name: &str) -> Result<String, Unreadable> {
+    table(&path_beside(deck, name))
+}
+
+/// The text of a table. Only plain files are read: a deck from elsewhere must not make the program
+/// wait for a device.
+pub fn table(path: &Path) -> Result<String, Unreadable> {
+    let unreadable = |message: String| Unreadable { message, severity: Severity::File };
+    let found = std::fs::metadata(path).map_err(|error| unreadable(OutputError::file(path, error).to_string()))?;
+    if !found.is_file() {
+        return Err(unreadable(format!("{}: not a plain file", path.display())));
+    }
+    text(path).map_err(|error| {
+        let severity = match &error {
+            CommandError::Deck(DeckError { fault: DeckFault::Limit, .. }) => Severity::Limit,
+            CommandError::Io(_) => Severity::File,
+            CommandError::Deck(_)
+            | CommandError::Usage(_)
+            | CommandError::Locked(_)
+            | CommandError::Checkpoint(_)
+            | CommandError::Run(_)
+            | CommandError::Stopped { .. }
+            | CommandError::SearchStopped { .. }
+            | CommandError::Missed(_)
+            | CommandError::Unexpected(_)
+            | CommandError::Sweep(_)
+            | CommandError::Warnings(_) => Severity::Error,
+        };
+        Unreadable { message: error.to_string(), severity }
+    })
+}
+
+/// The text of a deck or a sweep.toml.
+pub fn deck_text(path: &Path) -> Result<String, CommandError> {
+    let text = text(path)?;
+    check_parts(path, &text)?;
+    Ok(text)
+}
+
+/// Refuses a deck of very many short lines or entries: reading takes far more memory than its text.
+fn check_parts(path: &Path, text: &str) -> Result<(), CommandError> {
+    let parts = text.bytes().filter(|byte| matches!(byte, b'\n' | b',' | b'[' | b'{' | b'=')).count();
+    if parts <= MOST_PARTS {
+        return Ok(());
+    }
+    let path = path.display();
+    let message = format!(
+        "{path}: {parts} lines and entries of lists are more than the limit of {MOST_PARTS}: put long tables into CSV files"
+    );
+    Err(CommandError::limit(message))
 }
 
 /// The text of a file.
@@ -108,33 +208,72 @@ fn expected_failures(deck: &Deck) -> Vec<String> {
 }
 
 /// Messages as the user sees them. Of warnings that differ only in names and numbers the first is
-/// shown, with the lines of the others.
+/// shown, with the lines of the others. Of very many messages the first are shown, and the others
+/// counted.
 pub fn render(path: &str, text: &str, diagnostics: &[Diagnostic]) -> String {
     let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
     sorted.sort_by_key(|d| d.span.as_ref().map_or(0, |span| span.start));
-    let mut shown: Vec<(&Diagnostic, Vec<usize>)> = Vec::new();
+    let mut shown: Vec<Message> = Vec::new();
+    let mut hidden = 0;
+    let mut lines = LineCounter { text: text.as_bytes(), at: 0, line: 1 };
     for diagnostic in sorted {
-        let same = |(first, _): &&mut (&Diagnostic, Vec<usize>)| {
+        let line = diagnostic.span.as_ref().map(|span| lines.line_at(span.start));
+        let same = |message: &Message| {
+            let first = message.diagnostic;
             diagnostic.is_warning() && first.is_warning() && bare(&first.message) == bare(&diagnostic.message)
         };
-        let line = diagnostic.span.as_ref().map(|span| {
-            text.as_bytes()[..span.start.min(text.len())].iter().filter(|byte| **byte == b'\n').count() + 1
-        });
-        match (shown.iter_mut().find(same), line) {
-            (Some((_, others)), Some(line)) => others.push(line),
-            _ => shown.push((diagnostic, Vec::new())),
+        match (shown.iter().position(same), line) {
+            (Some(first), Some(line)) => shown[first].others.push(line),
+            _ if shown.len() < MOST_MESSAGES => shown.push(Message { diagnostic, others: Vec::new() }),
+            _ => hidden += 1,
         }
     }
-    let one = |(diagnostic, others): &(&Diagnostic, Vec<usize>)| {
-        let lines: Vec<String> = others.iter().map(usize::to_string).collect();
+    let mut rendered: Vec<String> = shown.iter().map(|message| message.render(path, text)).collect();
+    match hidden {
+        0 => {}
+        1 => rendered.push("and 1 more message".into()),
+        _ => rendered.push(format!("and {hidden} more messages")),
+    }
+    rendered.join("\n")
+}
+
+/// A message that is shown.
+struct Message<'a> {
+    diagnostic: &'a Diagnostic,
+    /// Lines to which the same warning applies
+    others: Vec<usize>,
+}
+
+impl Message<'_> {
+    fn render(&self, path: &str, text: &str) -> String {
+        let mut lines: Vec<String> = self.others.iter().take(MOST_MESSAGES).map(usize::to_string).collect();
+        if self.others.len() > lines.len() {
+            lines.push(format!("and {} more", self.others.len() - lines.len()));
+        }
         let others = match &lines[..] {
             [] => String::new(),
             [line] => format!("the same warning applies to line {line}\n"),
             lines => format!("the same warning applies to lines {}\n", lines.join(", ")),
         };
-        format!("{}\n{others}", diagnostic.render(path, text, console::styled()))
-    };
-    shown.iter().map(one).collect::<Vec<_>>().join("\n")
+        format!("{}\n{others}", self.diagnostic.render(path, text, console::styled()))
+    }
+}
+
+/// Counts lines from place to place.
+struct LineCounter<'a> {
+    text: &'a [u8],
+    at: usize,
+    line: usize,
+}
+
+impl LineCounter<'_> {
+    /// The line at a byte, from 1. Bytes must not decrease from call to call.
+    fn line_at(&mut self, byte: usize) -> usize {
+        let end = byte.clamp(self.at, self.text.len().max(self.at));
+        self.line += self.text[self.at..end].iter().filter(|byte| **byte == b'\n').count();
+        self.at = end;
+        self.line
+    }
 }
 
 /// A message without names and numbers, to compare warnings.
@@ -161,7 +300,14 @@ pub fn without_extension(path: &Path, extension: &str) -> String {
     let has_extension = file.get(end..).is_some_and(|found| found.eq_ignore_ascii_case(extension));
     let name = if has_extension { &file[..end] } else { &file[..] };
     // Names become folders, never paths that lead elsewhere.
-    if name.chars().all(|c| c == '.') { "deck".into() } else { name.into() }
+    if !name.chars().all(|c| c == '.') {
+        name.into()
+    } else if file.chars().all(|c| c == '.') {
+        "deck".into()
+    } else {
+        // A file that is called `.toml`: no other deck has its name.
+        file
+    }
 }
 
 #[cfg(test)]
@@ -175,7 +321,8 @@ mod tests {
             ("ARM.TOML", "ARM"),
             ("arm2_0.004.toml", "arm2_0.004"),
             ("arm2_0.001", "arm2_0.001"),
-            (".toml", "deck"),
+            (".toml", ".toml"),
+            ("odd/.toml", ".toml"),
             ("..", "deck"),
             ("", "deck"),
         ] {

@@ -14,6 +14,7 @@ mod json;
 mod load;
 mod manual;
 mod new;
+mod outputs;
 mod plot;
 mod progress;
 mod report;
@@ -49,6 +50,9 @@ struct Arguments {
     command: Command,
     #[command(flatten)]
     print_options: console::PrintOptions,
+    /// Also replace plain files that beamsim did not write
+    #[arg(long, global = true)]
+    force: bool,
 }
 
 /// Decks and changes to them.
@@ -204,9 +208,10 @@ pub fn main() -> ExitCode {
     signals::listen();
     let arguments = match parse() {
         Ok(arguments) => arguments,
-        Err(error) => return ExitCode::from(usage(error) as u8),
+        Err(error) => return ExitCode::from(after_printing(usage(error)) as u8),
     };
     console::configure(arguments.print_options);
+    outputs::configure(arguments.force);
     let status = match arguments.command {
         Command::Run { input, wanted, out } => run::run(&input.decks, &input.set, &wanted, out.as_deref()),
         Command::Check { input } => check::check(&input.decks, &input.set),
@@ -225,7 +230,16 @@ pub fn main() -> ExitCode {
         Command::Completions { shell } => completions::completions(shell, Arguments::command()),
         Command::Manual { out } => manual::manual(Arguments::command(), out.as_deref()),
     };
-    ExitCode::from(with_warnings(status) as u8)
+    ExitCode::from(after_printing(with_warnings(status)) as u8)
+}
+
+/// The exit status, which is at least that of a file that could not be written if standard output
+/// could not take everything.
+fn after_printing(status: Status) -> Status {
+    let Some(error) = console::stdout_error() else { return status };
+    let error = CommandError::Io(format!("standard output: {error}"));
+    error.print();
+    status.max(error.status())
 }
 
 /// The command line. A negative number is the value of the option before it.
@@ -262,13 +276,13 @@ fn usage(mut error: clap::Error) -> Status {
         return Status::Fine;
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        console::note(text.trim_end());
+        console::notes(text.trim_end());
         console::error("usage", "a command is needed");
         return Status::Wrong;
     }
     let (first, rest) = text.split_once('\n').unwrap_or((&text, ""));
     if !rest.trim().is_empty() {
-        console::note(rest.trim());
+        console::notes(rest.trim());
     }
     console::error("usage", first.trim_start_matches("error: "));
     Status::Wrong

@@ -68,5 +68,10 @@ pub fn new(template: Template, out: Option<&Path>) -> Status {
 /// The schema that the deck names in its first line, for editors.
 fn schema_beside(path: &Path) -> std::io::Result<()> {
     let schema = path.with_file_name("beamsim.schema.json");
-    if schema.exists() { Ok(()) } else { std::fs::write(schema, SCHEMA) }
+    // Never through a link that stands there.
+    match OpenOptions::new().write(true).create_new(true).open(&schema) {
+        Ok(mut file) => file.write_all(SCHEMA.as_bytes()),
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(()),
+        Err(error) => Err(error),
+    }
 }

@@ -3,10 +3,10 @@
 use super::error::CommandError;
 use super::status::Status;
 use super::verdict::Verdict;
-use super::{console, json, load};
+use super::{console, json, load, outputs};
 use crate::deck::nearest;
 use crate::output::{
-    Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, PartFile, Record, Scale, Units, quantity_of,
+    Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, OutputKind, PartFile, Record, Scale, Units, quantity_of,
 };
 use beamsim_core::probe::{Quantity, clocks, quantity};
 use std::path::{Path, PathBuf};
@@ -81,6 +81,9 @@ pub fn plot(wanted: &PlotArguments) -> Status {
 }
 
 fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
+    let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
+    let format = Format::of(&path)?;
+    outputs::check_file(&path, format.kind())?;
     let mut runs = wanted.results.iter().map(|path| read(path, false)).collect::<Result<Vec<_>, _>>()?;
     runs.extend(wanted.reference.as_ref().map(|path| read(path, true)).transpose()?);
     tell_apart(&mut runs);
@@ -118,9 +121,7 @@ fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
         level: None,
         boundaries: abscissa.boundaries(&runs),
     };
-    let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
-    let picture = picture(&plot, &path)?;
-    PartFile::write_to(&path, &picture)?;
+    PartFile::write_to(&path, &format.draw(&plot)?)?;
     console::line(&format!("{}", path.display()));
     json::wrote("plot", &path);
     Ok(())
@@ -214,15 +215,39 @@ fn stage_by_stage(stages: &[f64], loads: &[f64]) -> Vec<f64> {
     values
 }
 
-/// In the format that the name of the file asks for.
-fn picture(plot: &LinePlot, path: &Path) -> Result<Vec<u8>, CommandError> {
-    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-    match extension.as_deref() {
-        None | Some("svg") => Ok(plot.to_svg().into_bytes()),
-        Some("png") => png(plot),
-        Some(other) => {
-            let message = format!("unknown file type `.{other}`: plots are written as .svg or .png");
-            Err(CommandError::Usage(message))
+/// Formats of plots.
+#[derive(Clone, Copy)]
+enum Format {
+    Svg,
+    Png,
+}
+
+impl Format {
+    /// The format that the name of a file asks for.
+    fn of(path: &Path) -> Result<Self, CommandError> {
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            None | Some("svg") => Ok(Self::Svg),
+            Some("png") => Ok(Self::Png),
+            Some(other) => {
+                let message = format!("unknown file type `.{other}`: plots are written as .svg or .png");
+                Err(CommandError::Usage(message))
+            }
+        }
+    }
+
+    fn kind(self) -> OutputKind {
+        match self {
+            Self::Svg => OutputKind::Svg,
+            Self::Png => OutputKind::Png,
+        }
+    }
+
+    /// A plot in this format.
+    fn draw(self, plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
+        match self {
+            Self::Svg => Ok(plot.to_svg().into_bytes()),
+            Self::Png => png(plot),
         }
     }
 }

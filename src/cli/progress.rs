@@ -1,6 +1,7 @@
 //! Progress of a run: a bar on a terminal, a line every few seconds elsewhere.
 
 use super::console;
+use crate::deck::shown_in_line;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -22,7 +23,7 @@ impl Progress {
     pub fn new(name: &str) -> Self {
         let bar = (std::io::stderr().is_terminal() && !console::is_quiet()).then(|| {
             let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} % {elapsed} (left {eta}) {msg}");
-            let bar = ProgressBar::new(10_000).with_prefix(name.to_string());
+            let bar = ProgressBar::new(10_000).with_prefix(shown_in_line(name).into_owned());
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
         Self { bar, name: name.into(), last: Instant::now() }
@@ -37,7 +38,7 @@ impl Progress {
         self.last = Instant::now();
         match &self.bar {
             Some(bar) => {
-                bar.set_message(place());
+                bar.set_message(shown_in_line(&place()).into_owned());
                 bar.set_position((done * 10_000.0) as u64);
             }
             None => console::remark(&format!("{}: {:.1} % ({})", self.name, 100.0 * done, place())),

@@ -7,8 +7,7 @@ use super::simulate::{Finished, simulate};
 use super::status::Status;
 use super::thread_count::{on_threads, threads_of};
 use super::verdict::Verdict;
-use super::{console, json, load, report, signals};
-use crate::output::ResultFolder;
+use super::{console, json, load, outputs, report, signals};
 use crate::scene::Scene;
 use beamsim_core::run::Failure;
 use std::path::{Path, PathBuf};
@@ -46,7 +45,7 @@ fn run_one(
     verdict: &mut Verdict,
 ) -> Result<(), CommandError> {
     let loaded = load::deck(path, settings)?;
-    let results = ResultFolder::claim(folder)?;
+    let results = outputs::claim(folder)?;
     let mut chosen = wanted.choose(name, path, loaded, &results)?;
     let mut target = wanted.restart.target(name, results, &chosen.loaded.scene)?;
     let missed = chosen.missed.take();

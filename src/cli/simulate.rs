@@ -5,8 +5,8 @@ use super::console;
 use super::progress::Progress;
 use super::signals;
 use crate::output::{
-    FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, ReachedAccuracy, Record, ResultFolder,
-    Row, RowCounter, Rows, SavedRun, SideColumns, Units,
+    DeckSource, FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, ReachedAccuracy, Record,
+    ResultFolder, Row, RowCounter, Rows, SavedRun, SideColumns, Units,
 };
 use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
@@ -25,8 +25,8 @@ pub struct RunExtras {
     pub outcome: Option<study::Outcome>,
     /// Error bars
     pub bars: Option<ErrorBars>,
-    /// The text of the deck
-    pub text: String,
+    /// The deck
+    pub source: DeckSource,
     /// Recorder of shapes for the report
     pub film: Option<Film>,
 }
@@ -81,7 +81,7 @@ pub fn simulate(
     let start = Instant::now();
     // From here on a signal stops the run, and what it has reached is written.
     let _kept = target.as_ref().map(|_| signals::keep());
-    let RunExtras { accuracy, outcome, bars, text, film } = extras;
+    let RunExtras { accuracy, outcome, bars, source, film } = extras;
     let (results, from, opened) = match target.map(|target| Results::open(scene, target, bars)).transpose() {
         Ok(opened) => {
             let (results, from) = opened.unzip();
@@ -121,7 +121,7 @@ pub fn simulate(
             result = Err(Failure::Io(error.to_string()));
         }
         let resumed = results.resumed;
-        let run = FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, text, resumed };
+        let run = FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, source, resumed };
         let mut content = Record::of(scene, run);
         let written = results.commit(&result, &mut content);
         record = Some(content);

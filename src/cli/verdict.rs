@@ -14,7 +14,7 @@ impl Verdict {
     /// Prints an error with its details and remembers it if it is the worst so far.
     pub fn fail(&mut self, error: CommandError) {
         if !error.details().is_empty() {
-            console::note(error.details());
+            console::diagnostics(error.details());
         }
         error.print();
         if error.status() > self.status() {

@@ -7,8 +7,8 @@ use super::simulate::{RunExtras, Target, simulate};
 use super::status::Status;
 use super::thread_count::threads_of;
 use super::verdict::Verdict;
-use super::{console, json, signals};
-use crate::output::{OutputError, ResultFolder};
+use super::{console, json, outputs, signals};
+use crate::output::OutputError;
 use crate::study::{Judgement, Recorder, expected_failure, judge};
 use std::path::{Path, PathBuf};
 
@@ -53,7 +53,7 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
 
 /// Runs a deck and judges its expectations; a deck that cannot be read may be expected to fail.
 fn one(path: &Path, name: &str, settings: &[String], folder: Option<&Path>) -> Result<Vec<Judgement>, CommandError> {
-    let Loaded { text, scene, .. } = match load::deck(path, settings) {
+    let Loaded { source, scene, .. } = match load::deck(path, settings) {
         Ok(loaded) => loaded,
         Err(CommandError::Deck(error)) if !error.expected.is_empty() => {
             let expected = error.expected.clone();
@@ -65,8 +65,8 @@ fn one(path: &Path, name: &str, settings: &[String], folder: Option<&Path>) -> R
         Err(error) => return Err(error),
     };
     let mut recorder = Recorder::new(&scene);
-    let extras = RunExtras { text, ..RunExtras::default() };
-    let target = folder.map(|folder| ResultFolder::claim(folder).map(Target::without_checkpoints)).transpose()?;
+    let extras = RunExtras { source, ..RunExtras::default() };
+    let target = folder.map(|folder| outputs::claim(folder).map(Target::without_checkpoints)).transpose()?;
     let finished = simulate(&scene, name, target, Some(&mut recorder), extras, threads_of(&scene, None));
     if let Some(signal) = signals::caught() {
         return Err(CommandError::Stopped { signal, message: format!("stopped by signal {signal}") });

@@ -36,3 +36,33 @@ pub(super) fn read_axes(table: &Table) -> Option<Option<Axes>> {
 pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
+
+/// The vector of length one in a direction; `None` for zero. Components of any size are allowed:
+/// they are scaled where their squares would overflow or vanish.
+pub(super) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
+    const SHORTEST: f64 = 1e-150;
+    const LONGEST: f64 = 1e150;
+    let length = dot(vector, vector).sqrt();
+    if (SHORTEST..=LONGEST).contains(&length) {
+        return Some(vector.map(|c| c / length));
+    }
+    let largest = vector.iter().fold(0.0, |largest: f64, c| largest.max(c.abs()));
+    let scaled = vector.map(|c| c / largest);
+    let length = dot(scaled, scaled).sqrt();
+    (largest > 0.0).then(|| scaled.map(|c| c / length))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_of_any_size_have_a_direction() {
+        for size in [5e-324, 1e-200, 1.0, 1e200, 1.7e308] {
+            assert_eq!(unit([size, 0.0, 0.0]), Some([1.0, 0.0, 0.0]), "{size}");
+        }
+        let [x, _, z] = unit([3e200, 0.0, -4e200]).unwrap();
+        assert!((x - 0.6).abs() < 1e-15 && (z + 0.8).abs() < 1e-15);
+        assert_eq!(unit([0.0; 3]), None);
+    }
+}

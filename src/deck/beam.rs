@@ -26,6 +26,16 @@ words! {
     }
 }
 
+words! {
+    /// `stations_in = …`
+    pub enum StationsWord {
+        /// Fractions of the length
+        Fraction = "fraction",
+        /// Arc length from the start
+        Length = "length",
+    }
+}
+
 /// `free_strain = […]` with its history
 #[derive(Clone, Debug)]
 pub struct FreeStrain {
@@ -45,6 +55,8 @@ pub struct Beam {
     /// Places of the sections, from 0 to 1 as fractions of the length, or to the length; none: at
     /// start and end
     pub stations: Option<Spanned<Vec<f64>>>,
+    /// The unit of the stations; left out: the last of them tells
+    pub stations_in: Option<StationsWord>,
     /// Its centre line
     pub path: Path,
     /// Elements of each piece; one number for all
@@ -69,10 +81,11 @@ pub struct Beam {
 pub const MOST_ELEMENTS: usize = 2_000_000;
 
 /// Keys of `[[beam]]`.
-pub(super) const KEYS: [&str; 13] = [
+pub(super) const KEYS: [&str; 14] = [
     "name",
     "section",
     "stations",
+    "stations_in",
     "through",
     "arc",
     "elements",
@@ -90,6 +103,10 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
     let name = table.required_text("name").and_then(|name| check_name(context, name));
     let sections = table.required("section").and_then(|item| read_sections(context, item));
     let stations = read_stations(&table, sections.as_ref().map_or(0, Vec::len));
+    if !table.has("stations") {
+        table.refuse("stations_in", "`stations_in` is only allowed with `stations`");
+    }
+    let stations_in = table.optional("stations_in", |context, item| Some(context.word(item, "stations_in")?.value));
     let path = read_path(&table);
     let elements = table.required("elements").and_then(|item| read_counts(context, item, "elements"));
     let order = table.optional("order", read_order);
@@ -102,6 +119,7 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
         name: name?,
         sections: sections?,
         stations: stations?,
+        stations_in: stations_in?,
         path: path?,
         elements: elements?,
         order: order?.unwrap_or(1),

@@ -1,5 +1,6 @@
 //! Errors and warnings of a deck with their places, and help.
 
+use super::shown::{shown_in_line, shown_in_place};
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use beamsim_core::warning::WarningKind;
 use std::ops::Range;
@@ -40,6 +41,8 @@ pub struct Diagnostic {
     pub severity: Severity,
     /// The unknown name, for errors about one
     pub unknown: Option<String>,
+    /// True for an error about a key that the table does not have
+    pub is_of_key: bool,
 }
 
 /// Severity of a diagnostic.
@@ -51,6 +54,8 @@ pub enum Severity {
     Error,
     /// Larger than the stated bounds
     Limit,
+    /// A file that the deck names could not be read
+    File,
 }
 
 impl Diagnostic {
@@ -64,6 +69,7 @@ impl Diagnostic {
             help: None,
             severity: Severity::Error,
             unknown: None,
+            is_of_key: false,
         }
     }
 
@@ -105,11 +111,15 @@ impl Diagnostic {
         self
     }
 
-    /// The diagnostic as text, with the lines it speaks of.
+    /// The diagnostic as text, with the lines it speaks of. Characters of the deck that would control
+    /// a terminal are escaped.
     pub fn render(&self, path: &str, text: &str, styled: bool) -> String {
+        let text = &*shown_in_place(text);
+        let path = &*shown_in_line(path);
+        let message = &*shown_in_line(&self.message);
         let title = match self.severity {
-            Severity::Warning(kind) => Level::WARNING.primary_title(&self.message).id(kind.name()),
-            Severity::Error | Severity::Limit => Level::ERROR.primary_title(&self.message),
+            Severity::Warning(kind) => Level::WARNING.primary_title(message).id(kind.name()),
+            Severity::Error | Severity::Limit | Severity::File => Level::ERROR.primary_title(message),
         };
         let mut group = match &self.span {
             Some(span) => {
@@ -127,7 +137,7 @@ impl Diagnostic {
             None => Group::with_title(title),
         };
         if let Some(help) = &self.help {
-            group = group.element(Level::HELP.message(help));
+            group = group.element(Level::HELP.message(shown_in_line(help)));
         }
         let renderer = if styled { Renderer::styled() } else { Renderer::plain() };
         renderer.render(&[group])

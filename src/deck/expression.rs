@@ -6,19 +6,27 @@
 use super::words::{Words, words};
 use std::f64::consts::PI;
 
-/// A parsed expression.
+/// A parsed expression: instructions in the order in which they are carried out, each of which
+/// takes its operands from a stack. Neither evaluating nor dropping it is recursive, however long it
+/// is.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Expression {
-    /// A number
+pub struct Expression {
+    instructions: Vec<Instruction>,
+}
+
+/// One step of an expression. Offsets are bytes of its text.
+#[derive(Clone, Debug, PartialEq)]
+enum Instruction {
+    /// Adds a number to the stack
     Number(f64),
-    /// A name and its byte offset
+    /// Adds the value of a name, which stands at an offset
     Name(String, usize),
     /// -a
-    Negative(Box<Expression>),
-    /// a (+ - * / ^) b
-    Binary(Operator, Box<Expression>, Box<Expression>),
-    /// f(a, …) of a known function with the right number of arguments
-    Call(Function, Vec<Expression>),
+    Negative,
+    /// a (+ - * / ^) b, with the offset of the operator
+    Binary(Operator, usize),
+    /// f(a) or f(a, b), with the offset of its name
+    Call(Function, usize),
 }
 
 /// An error in an expression.
@@ -115,123 +123,178 @@ impl Function {
 /// Names with a fixed meaning.
 pub const CONSTANTS: [(&str, f64); 2] = [("pi", PI), ("deg", PI / 180.0)];
 
-/// Longest expression, in bytes: it is evaluated recursively.
+/// Longest expression, in bytes.
 const LONGEST: usize = 2_000;
 
-/// Deepest nesting of an expression.
+/// Deepest nesting of an expression: it is parsed recursively.
 const MAX_DEPTH: usize = 100;
 
 impl Expression {
+    /// The expression of a number.
+    pub fn of_number(value: f64) -> Self {
+        Self { instructions: vec![Instruction::Number(value)] }
+    }
+
     /// Parses `text`.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
         if text.len() > LONGEST {
             let message = format!("an expression can have at most {LONGEST} characters");
             return Err(ExpressionError { message, offset: 0 });
         }
-        let mut parser = Parser { text, at: 0, depth: 0 };
-        let expression = parser.sum()?;
+        let mut parser = Parser { text, at: 0, depth: 0, instructions: Vec::new() };
+        parser.sum()?;
         parser.skip_space();
         match parser.peek() {
-            None => Ok(expression),
+            None => Ok(Self { instructions: parser.instructions }),
             Some(c) => Err(parser.error(format!("unexpected `{c}`"))),
         }
     }
 
-    /// Evaluates; `lookup` gives the values of names.
+    /// Evaluates; `lookup` gives the values of names. The value of every operation must be finite,
+    /// not only that of the whole expression: `min(2, sqrt(-1))` is an error.
     pub fn evaluate(&self, lookup: &mut dyn FnMut(&str) -> Option<Jet>) -> Result<Jet, ExpressionError> {
-        match self {
-            Self::Number(value) => Ok([*value, 0.0, 0.0]),
-            Self::Name(name, offset) => {
-                let constant = CONSTANTS.iter().find(|(known, _)| known == name).map(|&(_, value)| [value, 0.0, 0.0]);
-                let unknown = || ExpressionError { message: format!("unknown name `{name}`"), offset: *offset };
-                constant.or_else(|| lookup(name)).ok_or_else(unknown)
-            }
-            Self::Negative(a) => Ok(a.evaluate(lookup)?.map(|x| -x)),
-            Self::Binary(operator, a, b) => Ok(binary(*operator, a.evaluate(lookup)?, b.evaluate(lookup)?)),
-            Self::Call(function, arguments) => {
-                let mut values = [[0.0; 3]; 2];
-                for (value, argument) in values.iter_mut().zip(arguments) {
-                    *value = argument.evaluate(lookup)?;
+        let mut stack: Vec<Jet> = Vec::new();
+        for instruction in &self.instructions {
+            let value = match instruction {
+                Instruction::Number(value) => [*value, 0.0, 0.0],
+                Instruction::Name(name, offset) => {
+                    let constant = CONSTANTS.iter().find(|(known, _)| known == name);
+                    let constant = constant.map(|&(_, value)| [value, 0.0, 0.0]);
+                    let unknown = || ExpressionError { message: format!("unknown name `{name}`"), offset: *offset };
+                    constant.or_else(|| lookup(name)).ok_or_else(unknown)?
                 }
-                Ok(call(*function, values[0], values[1]))
-            }
+                Instruction::Negative => operand(&mut stack).map(|x| -x),
+                Instruction::Binary(operator, offset) => {
+                    let b = operand(&mut stack);
+                    let a = operand(&mut stack);
+                    let value = binary(*operator, a, b);
+                    finite(value, *offset, || format!("{} {} {}", short(a[0]), operator.word(), bracketed(b[0])))?
+                }
+                Instruction::Call(function, offset) => {
+                    let takes_two = function.arguments() == 2;
+                    let b = if takes_two { operand(&mut stack) } else { [0.0; 3] };
+                    let a = operand(&mut stack);
+                    let second = if takes_two { format!(", {}", short(b[0])) } else { String::new() };
+                    finite(call(*function, a, b), *offset, || format!("{}({}{second})", function.word(), short(a[0])))?
+                }
+            };
+            stack.push(value);
         }
+        Ok(operand(&mut stack))
     }
 
-    /// Calls `visit` with every name in the expression.
+    /// Calls `visit` with every name in the expression and its byte offset.
     pub fn names(&self, visit: &mut dyn FnMut(&str, usize)) {
-        match self {
-            Self::Number(_) => {}
-            Self::Name(name, offset) => visit(name, *offset),
-            Self::Negative(a) => a.names(visit),
-            Self::Binary(_, a, b) => {
-                a.names(visit);
-                b.names(visit);
+        for instruction in &self.instructions {
+            match instruction {
+                Instruction::Name(name, offset) => visit(name, *offset),
+                Instruction::Number(_) | Instruction::Negative | Instruction::Binary(..) | Instruction::Call(..) => {}
             }
-            Self::Call(_, arguments) => arguments.iter().for_each(|a| a.names(visit)),
         }
     }
+}
+
+/// Takes the last value of the stack. The parser leaves as many as the instructions take.
+fn operand(stack: &mut Vec<Jet>) -> Jet {
+    stack.pop().unwrap_or([f64::NAN; 3])
+}
+
+/// A value of an operation if it is finite; the derivatives may be infinite, as at the corner of a
+/// root.
+fn finite(value: Jet, offset: usize, operation: impl Fn() -> String) -> Result<Jet, ExpressionError> {
+    if value[0].is_finite() {
+        return Ok(value);
+    }
+    let is = if value[0].is_nan() { "is not a number" } else { "is not finite" };
+    Err(ExpressionError { message: format!("`{}` {is}", operation()), offset })
+}
+
+/// An expression for messages: of a long one the beginning.
+pub fn shortened(text: &str) -> String {
+    /// Characters in a message, at most.
+    const MOST: usize = 60;
+    match text.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.into(),
+    }
+}
+
+/// A number for messages: with an exponent where that is shorter.
+fn short(value: f64) -> String {
+    let text = format!("{value:?}");
+    text.strip_suffix(".0").unwrap_or(&text).into()
+}
+
+/// A number behind an operator.
+fn bracketed(value: f64) -> String {
+    if value < 0.0 { format!("({})", short(value)) } else { short(value) }
 }
 
 struct Parser<'a> {
     text: &'a str,
     at: usize,
     depth: usize,
+    instructions: Vec<Instruction>,
 }
 
 impl Parser<'_> {
-    fn sum(&mut self) -> Result<Expression, ExpressionError> {
+    fn sum(&mut self) -> Result<(), ExpressionError> {
+        self.descend()?;
+        self.product()?;
+        while let Some((operator, offset)) = self.operator("+-") {
+            self.product()?;
+            self.instructions.push(Instruction::Binary(operator, offset));
+        }
+        self.depth -= 1;
+        Ok(())
+    }
+
+    fn descend(&mut self) -> Result<(), ExpressionError> {
         self.depth += 1;
         if self.depth > MAX_DEPTH {
             return Err(self.error("the expression is nested too deeply".into()));
         }
-        let mut left = self.product()?;
-        while let Some(operator) = self.operator("+-") {
-            left = Expression::Binary(operator, Box::new(left), Box::new(self.product()?));
-        }
-        self.depth -= 1;
-        Ok(left)
+        Ok(())
     }
 
-    fn product(&mut self) -> Result<Expression, ExpressionError> {
-        let mut left = self.signed()?;
-        while let Some(operator) = self.operator("*/") {
-            left = Expression::Binary(operator, Box::new(left), Box::new(self.signed()?));
+    fn product(&mut self) -> Result<(), ExpressionError> {
+        self.signed()?;
+        while let Some((operator, offset)) = self.operator("*/") {
+            self.signed()?;
+            self.instructions.push(Instruction::Binary(operator, offset));
         }
-        Ok(left)
+        Ok(())
     }
 
-    fn signed(&mut self) -> Result<Expression, ExpressionError> {
+    fn signed(&mut self) -> Result<(), ExpressionError> {
         let mut negative = false;
         while let Some(sign) = self.accept("+-") {
             negative ^= sign == '-';
         }
-        let value = self.power()?;
-        Ok(if negative { Expression::Negative(Box::new(value)) } else { value })
+        self.power()?;
+        if negative {
+            self.instructions.push(Instruction::Negative);
+        }
+        Ok(())
     }
 
-    fn power(&mut self) -> Result<Expression, ExpressionError> {
-        let base = self.atom()?;
-        if self.accept("^").is_none() {
-            return Ok(base);
-        }
-        self.depth += 1;
-        if self.depth > MAX_DEPTH {
-            return Err(self.error("the expression is nested too deeply".into()));
-        }
-        let exponent = self.signed()?;
+    fn power(&mut self) -> Result<(), ExpressionError> {
+        self.atom()?;
+        let Some((operator, offset)) = self.operator("^") else { return Ok(()) };
+        self.descend()?;
+        self.signed()?;
         self.depth -= 1;
-        Ok(Expression::Binary(Operator::Power, Box::new(base), Box::new(exponent)))
+        self.instructions.push(Instruction::Binary(operator, offset));
+        Ok(())
     }
 
-    fn atom(&mut self) -> Result<Expression, ExpressionError> {
+    fn atom(&mut self) -> Result<(), ExpressionError> {
         self.skip_space();
         match self.peek() {
             Some('(') => {
                 self.at += 1;
-                let inner = self.sum()?;
-                self.expect(')')?;
-                Ok(inner)
+                self.sum()?;
+                self.expect(')')
             }
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_ascii_alphabetic() || c == '_' => self.name_or_call(),
@@ -240,7 +303,7 @@ impl Parser<'_> {
         }
     }
 
-    fn number(&mut self) -> Result<Expression, ExpressionError> {
+    fn number(&mut self) -> Result<(), ExpressionError> {
         let start = self.at;
         let digits = |parser: &mut Self| {
             while parser.peek().is_some_and(|c| c.is_ascii_digit() || c == '_') {
@@ -261,11 +324,16 @@ impl Parser<'_> {
             if self.peek().is_some_and(|c| c.is_ascii_digit()) { digits(self) } else { self.at = before }
         }
         let text = self.text[start..self.at].replace('_', "");
-        let wrong = || ExpressionError { message: format!("`{text}` is not a number"), offset: start };
-        text.parse().map(Expression::Number).map_err(|_| wrong())
+        let wrong = |why: &str| ExpressionError { message: format!("`{text}` is {why}"), offset: start };
+        let value: f64 = text.parse().map_err(|_| wrong("not a number"))?;
+        if !value.is_finite() {
+            return Err(wrong("too large for a floating-point number"));
+        }
+        self.instructions.push(Instruction::Number(value));
+        Ok(())
     }
 
-    fn name_or_call(&mut self) -> Result<Expression, ExpressionError> {
+    fn name_or_call(&mut self) -> Result<(), ExpressionError> {
         let start = self.at;
         while self.peek().is_some_and(|c| c.is_ascii_alphanumeric() || c == '_') {
             self.at += 1;
@@ -273,7 +341,8 @@ impl Parser<'_> {
         let name = &self.text[start..self.at];
         self.skip_space();
         if self.peek() != Some('(') {
-            return Ok(Expression::Name(name.into(), start));
+            self.instructions.push(Instruction::Name(name.into(), start));
+            return Ok(());
         }
         self.at += 1;
         let Some(function) = Function::of(name) else {
@@ -281,21 +350,26 @@ impl Parser<'_> {
             let message = format!("unknown function `{name}`; known functions: {known}");
             return Err(ExpressionError { message, offset: start });
         };
-        let mut arguments = vec![self.sum()?];
+        self.sum()?;
+        let mut given = 1;
         while self.accept(",").is_some() {
-            arguments.push(self.sum()?);
+            self.sum()?;
+            given += 1;
         }
         self.expect(')')?;
         let count = function.arguments();
-        if arguments.len() != count {
-            let message = format!("`{name}` takes {count} argument(s), not {}", arguments.len());
+        if given != count {
+            let message = format!("`{name}` takes {count} argument(s), not {given}");
             return Err(ExpressionError { message, offset: start });
         }
-        Ok(Expression::Call(function, arguments))
+        self.instructions.push(Instruction::Call(function, start));
+        Ok(())
     }
 
-    fn operator(&mut self, any_of: &str) -> Option<Operator> {
-        Operator::of(self.accept(any_of)?.encode_utf8(&mut [0; 4]))
+    /// One of some operators, with its offset.
+    fn operator(&mut self, any_of: &str) -> Option<(Operator, usize)> {
+        let operator = Operator::of(self.accept(any_of)?.encode_utf8(&mut [0; 4]))?;
+        Some((operator, self.at - operator.word().len()))
     }
 
     fn accept(&mut self, any_of: &str) -> Option<char> {
@@ -475,6 +549,42 @@ mod tests {
         assert_eq!(error("atan2(1)").message, "`atan2` takes 2 argument(s), not 1");
         assert_eq!(error("3 $ 4").offset, 2);
         assert!(Expression::parse(&"(".repeat(1000)).is_err());
+    }
+
+    #[test]
+    fn every_operation_must_give_a_finite_number() {
+        let told = |text: &str| Expression::parse(text).and_then(|e| e.evaluate(&mut |_| None)).unwrap_err();
+        for (text, message, offset) in [
+            ("min(2, sqrt(-1))", "`sqrt(-1)` is not a number", 7),
+            ("min(sqrt(-1), 2)", "`sqrt(-1)` is not a number", 4),
+            ("max(2, -1/0)", "`-1 / 0` is not finite", 9),
+            ("1/(1/0)", "`1 / 0` is not finite", 4),
+            ("atan(10^400)", "`10 ^ 400` is not finite", 7),
+            ("0^-1", "`0 ^ (-1)` is not finite", 1),
+            ("atan2(log(0), 1)", "`log(0)` is not finite", 6),
+            ("10^200*10^200", "`1e200 * 1e200` is not finite", 6),
+            ("0 * exp(1000)", "`exp(1000)` is not finite", 4),
+            ("1 / 1e999", "`1e999` is too large for a floating-point number", 4),
+        ] {
+            let error = told(text);
+            assert_eq!((error.message.as_str(), error.offset), (message, offset), "{text}");
+        }
+    }
+
+    /// The slope of a root is infinite where it begins: its value is not.
+    #[test]
+    fn infinite_derivatives_are_no_errors() {
+        let at_zero = Expression::parse("sqrt(t)").unwrap().evaluate(&mut |_| Some([0.0, 1.0, 0.0])).unwrap();
+        assert_eq!(at_zero[0], 0.0);
+    }
+
+    #[test]
+    fn the_longest_expressions_are_evaluated_on_a_small_stack() {
+        let sum = "1".to_string() + &"+1".repeat(LONGEST / 2 - 1);
+        let nested = "(".repeat(90) + "1" + &")".repeat(90);
+        let small = std::thread::Builder::new().stack_size(256 << 10);
+        let values = small.spawn(move || [value(&sum), value(&nested)]).unwrap().join().unwrap();
+        assert_eq!(values, [(LONGEST / 2) as f64, 1.0]);
     }
 
     /// A ramp and what holds it would add up at their corner if each took its side by the order of

@@ -1,7 +1,7 @@
 //! `[history.NAME]`, and the key `history` of the tables that it drives.
 
 use super::diagnostic::{Diagnostic, Spanned};
-use super::expression::Expression;
+use super::expression::{Expression, shortened};
 use super::point::check_name;
 use super::reader::{Context, Item, Table};
 use super::stage::read_stages;
@@ -141,7 +141,7 @@ fn read_expression(table: &Table) -> Option<Expression> {
         Err(_) if context.parameters.is_broken(&text.value) => None,
         Err(error) => {
             let at = text.span.start + 1 + error.offset;
-            let message = format!("in the expression `{}`: {}", text.value, error.message);
+            let message = format!("in the expression `{}`: {}", shortened(&text.value), error.message);
             context.report(Diagnostic::error(message, at..at + 1));
             None
         }

@@ -1,32 +1,77 @@
 //! Tables beside the deck: `{ csv = "spine.csv" }` is replaced by the rows of the file, so that all
 //! later steps have one whole text.
 
-use super::Diagnostic;
+use super::beam::StationsWord;
+use super::diagnostic::Severity;
+use super::{Diagnostic, Words};
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// Rows of a table, at most.
 const MOST_ROWS: usize = 1_000_000;
 
 /// Gives the text of a file that a deck names.
-pub type Open<'o> = &'o dyn Fn(&str) -> Result<String, String>;
+pub type Open<'o> = &'o dyn Fn(&str) -> Result<String, Unreadable>;
 
-/// The text of a deck with everything that it imports. Lines keep their numbers; sections of a
-/// table follow at the end.
-pub fn import(text: &str, open: Open) -> Result<String, Vec<Diagnostic>> {
+/// Why a file that a deck names could not be read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unreadable {
+    /// The reason, with the path
+    pub message: String,
+    /// The kind of error
+    pub severity: Severity,
+}
+
+/// The text of a deck, and the tables that it imports.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Imported {
+    /// The text with the rows of all tables. Lines keep their numbers; sections of a table follow at
+    /// the end.
+    pub text: String,
+    /// The tables, in the order in which they are read
+    pub tables: Vec<ImportedTable>,
+}
+
+/// A table that a deck imports.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedTable {
+    /// Its path in the deck
+    pub name: String,
+    /// The number of its rows
+    pub rows: usize,
+    /// A fingerprint of the content of its file
+    pub hash: String,
+}
+
+/// The fingerprint of a text: XXH3 of 64 bits. It finds files that have changed; it does not prove
+/// who wrote them.
+pub fn fingerprint(text: &str) -> String {
+    format!("xxh3:{:016x}", xxh3_64(text.as_bytes()))
+}
+
+/// Replaces everything that a deck imports by the rows of the files.
+pub fn import(text: &str, open: Open) -> Result<Imported, Vec<Diagnostic>> {
+    import_up_to(usize::MAX, text, open)
+}
+
+/// Replaces what a deck imports by the rows of the files, except tables of more rows than
+/// `most_rows`, whose names stay in the text.
+pub fn import_up_to(most_rows: usize, text: &str, open: Open) -> Result<Imported, Vec<Diagnostic>> {
+    let unchanged = || Imported { text: text.into(), tables: Vec::new() };
     if !text.contains("csv") {
-        return Ok(text.into());
+        return Ok(unchanged());
     }
     // A deck that is no TOML is reported when it is read.
-    let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text.into()) };
-    let mut importer = Importer { text, open, found: Vec::new(), sections: Vec::new(), imported: false };
+    let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(unchanged()) };
+    let mut importer = Importer { text, open, most_rows, found: Vec::new(), sections: Vec::new(), tables: Vec::new() };
     importer.beams(&mut document);
     importer.histories(&mut document);
-    let Importer { found, sections, imported, .. } = importer;
+    let Importer { found, sections, tables, .. } = importer;
     if !found.is_empty() {
         return Err(found);
     }
-    if !imported {
-        return Ok(text.into());
+    if tables.is_empty() {
+        return Ok(unchanged());
     }
     if !sections.is_empty() {
         let all = document.entry("section").or_insert(toml_edit::table());
@@ -41,15 +86,16 @@ pub fn import(text: &str, open: Open) -> Result<String, Vec<Diagnostic>> {
             }
         }
     }
-    Ok(document.to_string())
+    Ok(Imported { text: document.to_string(), tables })
 }
 
 struct Importer<'a> {
     text: &'a str,
     open: Open<'a>,
+    most_rows: usize,
     found: Vec<Diagnostic>,
     sections: Vec<(String, Item)>,
-    imported: bool,
+    tables: Vec<ImportedTable>,
 }
 
 impl Importer<'_> {
@@ -62,12 +108,13 @@ impl Importer<'_> {
                 beam.insert("through", Item::Value(points.into()));
             }
             if let Some(path) = named(beam.get("section"))
-                && let Some((stations, sections)) = self.table(&path, |table| table.sections())
+                && let Some(Stations { unit, places: stations, sections }) = self.table(&path, |table| table.sections())
             {
                 let name = beam.get("name").and_then(Item::as_str).map_or(number.to_string(), str::to_string);
                 let names: Vec<String> = (1..=stations.len()).map(|k| format!("{name} {k}")).collect();
                 beam.insert("section", Item::Value(names.iter().collect::<Array>().into()));
                 beam.insert("stations", Item::Value(stations.into_iter().collect::<Array>().into()));
+                beam.insert("stations_in", Item::Value(unit.word().into()));
                 self.sections.extend(names.into_iter().zip(sections.into_iter().map(Item::Table)));
             }
         }
@@ -91,13 +138,28 @@ impl Importer<'_> {
 
     /// Reads a file; errors are reported at its name.
     fn table<T>(&mut self, path: &str, of: impl Fn(&Csv) -> Result<T, String>) -> Option<T> {
-        self.imported = true;
-        let read = (self.open)(path).and_then(|content| Csv::read(&content)).and_then(|table| of(&table));
-        read.map_err(|why| {
-            let start = self.text.find(&format!("\"{path}\"")).map_or(0, |at| at + 1);
-            self.found.push(Diagnostic::error(format!("{path}: {why}"), start..start + path.len()));
-        })
-        .ok()
+        let wrong = |message: String| Unreadable { message, severity: Severity::Error };
+        let read = (self.open)(path).and_then(|content| {
+            let table = Csv::read(&content)?;
+            let found = of(&table).map_err(wrong)?;
+            let rows = table.rows.len();
+            Ok((found, ImportedTable { name: path.into(), rows, hash: fingerprint(&content) }))
+        });
+        match read {
+            Ok((_, table)) if table.rows > self.most_rows => None,
+            Ok((found, table)) => {
+                if !self.tables.contains(&table) {
+                    self.tables.push(table);
+                }
+                Some(found)
+            }
+            Err(Unreadable { message, severity }) => {
+                let start = self.text.find(&format!("\"{path}\"")).map_or(0, |at| at + 1);
+                let error = Diagnostic::error(format!("{path}: {message}"), start..start + path.len());
+                self.found.push(Diagnostic { severity, ..error });
+                None
+            }
+        }
     }
 }
 
@@ -106,38 +168,67 @@ fn named(item: Option<&Item>) -> Option<String> {
     Some(item?.as_table_like()?.get("csv")?.as_str()?.to_string())
 }
 
+/// Stations along a beam, and the section at each.
+struct Stations {
+    /// The unit of the places
+    unit: StationsWord,
+    places: Vec<f64>,
+    sections: Vec<Table>,
+}
+
 /// A table of numbers, with names above it or without.
 struct Csv {
     names: Vec<String>,
     rows: Vec<Vec<f64>>,
+    /// The line of each row in the file, from 1
+    lines: Vec<u64>,
 }
 
 impl Csv {
-    fn read(content: &str) -> Result<Self, String> {
+    fn read(content: &str) -> Result<Self, Unreadable> {
+        let wrong = |message: String| Unreadable { message, severity: Severity::Error };
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .from_reader(content.as_bytes());
-        let mut names = Vec::new();
-        let mut rows = Vec::new();
+        let mut table = Self { names: Vec::new(), rows: Vec::new(), lines: Vec::new() };
         for (number, record) in reader.records().enumerate() {
-            let record = record.map_err(|error| error.to_string())?;
+            let record = record.map_err(|error| wrong(error.to_string()))?;
             let line = record.position().map_or(number as u64 + 1, csv::Position::line);
-            let numbers: Vec<Option<f64>> =
-                record.iter().map(|cell| cell.parse().ok().filter(|x: &f64| x.is_finite())).collect();
-            match numbers.iter().position(Option::is_none) {
-                None => rows.push(numbers.into_iter().flatten().collect()),
-                Some(_) if number == 0 && numbers.iter().all(Option::is_none) => {
-                    names = record.iter().map(str::to_string).collect()
-                }
-                Some(column) => return Err(format!("line {line}: `{}` is not a number", &record[column])),
+            if number == 0 && record.iter().all(|cell| cell.parse::<f64>().is_err()) {
+                table.names = record.iter().map(str::to_string).collect();
+                continue;
             }
-            if rows.len() > MOST_ROWS {
-                return Err(format!("more rows than the limit of {MOST_ROWS}"));
+            table.rows.push(record.iter().map(|cell| number_of(cell, line)).collect::<Result<_, _>>().map_err(wrong)?);
+            table.lines.push(line);
+            if table.rows.len() > MOST_ROWS {
+                let message = format!("more rows than the limit of {MOST_ROWS}");
+                return Err(Unreadable { message, severity: Severity::Limit });
             }
         }
-        if rows.is_empty() { Err("the table contains no numbers".into()) } else { Ok(Self { names, rows }) }
+        if table.rows.is_empty() {
+            return Err(wrong("the table contains no numbers".into()));
+        }
+        let twice = |k: &usize| table.names[..*k].contains(&table.names[*k]);
+        match (0..table.names.len()).find(twice) {
+            Some(k) => Err(wrong(format!("two columns are called `{}`", table.names[k]))),
+            None => Ok(table),
+        }
+    }
+
+    /// Refuses a column that does not increase from row to row.
+    fn must_increase(&self, place: usize) -> Result<(), String> {
+        match self.rows.windows(2).position(|rows| rows[1][place] <= rows[0][place]) {
+            None => Ok(()),
+            Some(k) => {
+                let name = self.names.get(place).map_or(format!("column {}", place + 1), |name| format!("`{name}`"));
+                let line = self.lines[k + 1];
+                let before = self.rows[k][place];
+                let after = self.rows[k + 1][place];
+                Err(format!("line {line}: {name} must increase, but {after} comes after {before}"))
+            }
+        }
     }
 
     fn width(&self) -> usize {
@@ -167,9 +258,9 @@ impl Csv {
     fn history(&self, column: Option<&str>) -> Result<(Array, Array), String> {
         let time = self.place("time").unwrap_or(0);
         let value = match column {
-            Some(name) => self
-                .place(name)
-                .ok_or_else(|| format!("there is no column `{name}`, only {}", self.names.join(", ")))?,
+            Some(name) => {
+                self.place(name).ok_or_else(|| format!("there is no column `{name}`, only {}", listed(&self.names)))?
+            }
             // Of two the one that is not the time.
             None if self.width() == 2 => 1 - time,
             None => {
@@ -178,15 +269,33 @@ impl Csv {
                     .into());
             }
         };
+        self.must_increase(time)?;
         Ok((self.column(time).collect(), self.column(value).collect()))
     }
 
     /// Stations along a beam (`fraction` of its length, or `s` along it), and the section at each.
-    fn sections(&self) -> Result<(Vec<f64>, Vec<Table>), String> {
-        let place = self.place("fraction").or(self.place("s"));
-        let place = place.ok_or("a table of stations needs a column `fraction` (of the length) or `s` (arc length)")?;
+    fn sections(&self) -> Result<Stations, String> {
+        let (unit, place) = match (self.place("fraction"), self.place("s")) {
+            (Some(_), Some(_)) => return Err("give the column `fraction` or `s`, not both".into()),
+            (Some(place), None) => (StationsWord::Fraction, place),
+            (None, Some(place)) => (StationsWord::Length, place),
+            (None, None) => {
+                return Err("a table of stations needs a column `fraction` (of the length) or `s` (arc length)".into());
+            }
+        };
         if self.rows.len() < 2 {
             return Err("a beam needs at least two stations".into());
+        }
+        self.must_increase(place)?;
+        let first = self.rows[0][place];
+        if first != 0.0 {
+            let line = self.lines[0];
+            return Err(format!("line {line}: the stations must begin at 0 (the start of the beam), found {first}"));
+        }
+        let last = self.rows[self.rows.len() - 1][place];
+        if unit == StationsWord::Fraction && last != 1.0 {
+            let line = self.lines[self.rows.len() - 1];
+            return Err(format!("line {line}: `fraction` must end at 1 (the end of the beam), found {last}"));
         }
         let known =
             |name: &str| ["fraction", "s"].contains(&name) || RESULTANTS.contains(&name) || entry(name).is_some();
@@ -208,7 +317,7 @@ impl Csv {
             return Err("rotary inertia needs the three columns `rhoJ1`, `rhoJ2`, `rhoJ3`".into());
         }
         let sections = self.rows.iter().map(|row| self.section(row)).collect::<Result<_, _>>()?;
-        Ok((self.column(place).collect(), sections))
+        Ok(Stations { unit, places: self.column(place).collect(), sections })
     }
 
     fn section(&self, row: &[f64]) -> Result<Table, String> {
@@ -249,6 +358,35 @@ impl Csv {
     }
 }
 
+/// A cell of a table as a finite number.
+fn number_of(cell: &str, line: u64) -> Result<f64, String> {
+    match cell.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        Ok(_) => Err(format!("line {line}: `{cell}` is not a finite number")),
+        Err(_) => Err(format!("line {line}: `{}` is not a number", shortened(cell))),
+    }
+}
+
+/// The beginning of a cell, for messages: a file that is no table may have very long ones.
+fn shortened(cell: &str) -> String {
+    /// Characters of a cell in a message, at most.
+    const LONGEST: usize = 40;
+    match cell.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &cell[..end]),
+        None => cell.into(),
+    }
+}
+
+/// Names of columns for messages: the first ones, and the number of the others.
+fn listed(names: &[String]) -> String {
+    /// Names in a message, at most.
+    const MOST: usize = 20;
+    match names.len().checked_sub(MOST) {
+        None | Some(0) => names.join(", "),
+        Some(more) => format!("{} and {more} more", names[..MOST].join(", ")),
+    }
+}
+
 /// Columns of a section by resultants.
 const RESULTANTS: [&str; 10] = ["EA", "GA2", "GA3", "GJ", "EI2", "EI3", "rhoA", "rhoJ1", "rhoJ2", "rhoJ3"];
 
@@ -267,7 +405,7 @@ mod tests {
     use super::*;
 
     fn with(text: &str, file: &str) -> Result<String, Vec<Diagnostic>> {
-        import(text, &|_| Ok(file.to_string()))
+        import(text, &|_| Ok(file.to_string())).map(|imported| imported.text)
     }
 
     #[test]
@@ -287,7 +425,8 @@ mod tests {
             assert!(with(section, wrong).is_err(), "{wrong}");
         }
         let whole = with(section, "s,EA,GA2,GA3,GJ,EI2,EI3,rhoA\n0,9,8,7,6,5,4,3\n2,1,1,1,1,1,1,1\n").unwrap();
-        assert!(whole.contains("section = [\"b 1\", \"b 2\"]") && whole.contains("stations = [0.0, 2.0]"), "{whole}");
+        let stations = "stations = [0.0, 2.0]\nstations_in = \"length\"";
+        assert!(whole.contains("section = [\"b 1\", \"b 2\"]") && whole.contains(stations), "{whole}");
         assert!(whole.contains("[section.\"b 1\"]\nEA = 9.0\nGA = [8.0, 7.0]"), "{whole}");
         let full = with(section, "fraction,C11,C12,C22\n0,9,1,8\n1,9,2,8\n").unwrap();
         assert!(full.contains("[[9.0, 2.0, 0.0, 0.0, 0.0, 0.0], [2.0, 8.0"), "{full}");
@@ -302,13 +441,56 @@ mod tests {
             ("s,x,y\n0,0,0\n", "columns `x`, `y`, `z`"),
             ("O,0,0\n1,0,0\n", "line 1: `O` is not a number"),
             ("x,y,z\n", "no numbers"),
+            ("", "no numbers"),
+            ("x,y,z\n0,nan,0\n1,0,0\n", "line 2: `nan` is not a finite number"),
+            ("nan,inf,nan\n1,0,0\n", "line 1: `nan` is not a finite number"),
+            ("x,y,z\n0,1e999,0\n", "line 2: `1e999` is not a finite number"),
+            ("x,y,x,z\n0,0,0,0\n", "two columns are called `x`"),
         ] {
             let found = with(through, file).unwrap_err();
             assert!(found[0].message.contains(told), "{}", found[0].message);
             assert_eq!(&through[found[0].span.clone().unwrap()], "a.csv");
         }
-        let missing = import(through, &|_| Err("there is no such file".into())).unwrap_err();
-        assert!(missing[0].message.contains("no such file"));
+        let gone = || Unreadable { message: "there is no such file".into(), severity: Severity::File };
+        let missing = import(through, &|_| Err(gone())).unwrap_err();
+        assert!(missing[0].message.contains("no such file") && missing[0].severity == Severity::File);
+    }
+
+    #[test]
+    fn rows_must_be_in_order() {
+        let history = "[history.h]\ncsv = \"f.csv\"\n";
+        for (file, told) in [
+            ("time,F\n0,1\n2,1\n1,3\n", "f.csv: line 4: `time` must increase, but 1 comes after 2"),
+            ("0,1\n0,3\n", "line 2: column 1 must increase, but 0 comes after 0"),
+        ] {
+            let found = with(history, file).unwrap_err();
+            assert!(found[0].message.contains(told), "{}", found[0].message);
+        }
+        let section = "[[beam]]\nname = \"b\"\nsection = { csv = \"s.csv\" }\n";
+        for (places, told) in [
+            (["fraction", "0", "2"], "line 3: `fraction` must end at 1 (the end of the beam), found 2"),
+            (["fraction", "0", "0.5"], "line 3: `fraction` must end at 1"),
+            (["s", "0.5", "2"], "line 2: the stations must begin at 0"),
+            (["s", "0", "-1"], "line 3: `s` must increase"),
+        ] {
+            let names = "EA,GA2,GA3,GJ,EI2,EI3\n";
+            let file = format!("{},{names}{},1,1,1,1,1,1\n{},1,1,1,1,1,1\n", places[0], places[1], places[2]);
+            let found = with(section, &file).unwrap_err();
+            assert!(found[0].message.contains(told), "{}", found[0].message);
+        }
+        let both = with(section, "s,fraction,EA\n0,0,1\n1,1,1\n").unwrap_err();
+        assert!(both[0].message.contains("`fraction` or `s`, not both"), "{}", both[0].message);
+    }
+
+    #[test]
+    fn tables_are_known_by_rows_and_fingerprint() {
+        let history = "[history.h]\ncsv = \"f.csv\"\n[history.g]\ncsv = \"f.csv\"\n";
+        let imported = import(history, &|_| Ok("0,1\n1,2\n".into())).unwrap();
+        let table = ImportedTable { name: "f.csv".into(), rows: 2, hash: fingerprint("0,1\n1,2\n") };
+        assert_eq!(imported.tables, [table]);
+        let short = import_up_to(1, history, &|_| Ok("0,1\n1,2\n".into())).unwrap();
+        assert_eq!((short.text.as_str(), short.tables.len()), (history, 0));
+        assert_ne!(fingerprint("0,1\n1,2\n"), fingerprint("0,1\n1,3\n"));
     }
 
     #[test]

@@ -46,6 +46,9 @@ pub(super) fn read_initial<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
     if !table.has("velocity") && !table.has("spin") {
         table.wrong::<()>("[[initial]] needs `velocity` or `spin`");
     }
+    if !table.has("spin") {
+        table.refuse("about", "`about` is the centre of the `spin`, which is missing");
+    }
     let velocity = table.vector_or("velocity", [0.0; 3]);
     let spin = table.vector_or("spin", [0.0; 3]);
     let about = table.optional("about", read_point);

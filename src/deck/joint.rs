@@ -1,6 +1,6 @@
 //! `[[joint]]`: connections of two beams or nodes, or of one of them with ground.
 
-use super::axes::dot;
+use super::axes::{dot, unit};
 use super::diagnostic::{Diagnostic, Span, Spanned, one_of};
 use super::history::{HistoryUse, read_history_use};
 use super::point::{PointRef, read_point};
@@ -186,9 +186,8 @@ fn read_normal_pair(table: &Table) -> Option<Vec<[f64; 3]>> {
 /// A vector that is not zero, made one of unit length.
 fn read_unit(context: &Context, item: &Item) -> Option<[f64; 3]> {
     let vector = context.vector::<3>(item)?;
-    let length = dot(vector.value, vector.value).sqrt();
-    if length > 0.0 {
-        return Some(vector.value.map(|c| c / length));
+    match unit(vector.value) {
+        Some(unit) => Some(unit),
+        None => context.wrong(vector.span, "an axis must not be zero"),
     }
-    context.wrong(vector.span, "an axis must not be zero")
 }

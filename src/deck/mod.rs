@@ -32,6 +32,7 @@ mod resolved;
 mod schema;
 mod scheme;
 mod section;
+mod shown;
 mod spring;
 mod stage;
 mod support;
@@ -41,7 +42,7 @@ mod words;
 
 pub use accuracy::{Accuracy, is_named, without_stage};
 pub use axes::Axes;
-pub use beam::{Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Path};
+pub use beam::{Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Path, StationsWord};
 pub use body::Body;
 pub use cost::{Cost, NormWord};
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, one_of};
@@ -50,7 +51,7 @@ pub use expect::{Expect, ExpectBody, Instant, Reduce, Reduction, Target};
 pub use expression::{Expression, Jet};
 pub use hints::{Hint, hint, nearest};
 pub use history::{HistoryBody, HistoryTable, HistoryUse};
-pub use import::import;
+pub use import::{Imported, ImportedTable, Unreadable, fingerprint, import, import_up_to};
 pub use initial::{Initial, InitialTarget};
 pub use joint::{Joint, JointMotor, JointParts};
 pub use load::{Frame, Load, LoadTarget, LoadVector};
@@ -64,6 +65,7 @@ pub use point::PointRef;
 pub use schema::{Entry, SCHEMA, entries, explain, similar};
 pub use scheme::{SchemeName, SchemeWord};
 pub use section::{Section, SectionBody, Shape};
+pub use shown::{hides_text, shown, shown_in_line};
 pub use spring::{Spring, SpringBody};
 pub use stage::{MOST_STEPS, RotatingFrame, STEP_TOLERANCE, Stage, StageBody, Until};
 pub use support::Support;
@@ -73,6 +75,7 @@ pub(crate) use words::words;
 
 use reader::{Context, Table};
 use std::cell::RefCell;
+use std::collections::HashSet;
 use toml::de::{DeTable, DeValue};
 
 /// A deck as it stands in the text.
@@ -177,7 +180,13 @@ fn describe_syntax(text: &str, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
         diagnostic
     };
     let twice = |error: &toml::de::Error| error.message().contains("duplicate key");
-    errors.iter().enumerate().filter(|(k, error)| *k == 0 || twice(error)).map(|(_, error)| describe(error)).collect()
+    let shown = errors.iter().enumerate().filter(|(k, error)| *k == 0 || twice(error));
+    let mut shown: Vec<Diagnostic> = shown.map(|(_, error)| describe(error)).collect();
+    let hidden = errors.len() - shown.len();
+    if let Some(first) = shown.first_mut().filter(|_| hidden > 0) {
+        first.help = Some(format!("{hidden} more syntax error(s) may be consequences of this one"));
+    }
+    shown
 }
 
 /// The place of the key with the most dots.
@@ -210,7 +219,8 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         histories.iter().map(|h| h.name.value.as_str()).collect(),
     ]
     .concat();
-    let broken = defined_names(document).into_iter().filter(|name| !read.contains(&name.as_str())).collect();
+    let read: HashSet<&str> = read.into_iter().collect();
+    let broken = defined_names(document).into_iter().filter(|name| !read.contains(name.as_str())).collect();
     units::check_units(&top);
     let deck = Deck {
         broken,

@@ -1,6 +1,6 @@
 //! `[output]`: nodes, columns and rows that are written.
 
-use super::diagnostic::Spanned;
+use super::diagnostic::{Span, Spanned};
 use super::reader::{Context, Table};
 use super::stage::MOST_STEPS;
 
@@ -15,13 +15,15 @@ pub struct Output {
     pub every: usize,
     /// Rows at multiples of this time
     pub interval: Option<f64>,
+    /// Place of `interval`
+    pub interval_span: Span,
     /// True where the whole shape is written for ParaView
     pub vtk: bool,
 }
 
 impl Default for Output {
     fn default() -> Self {
-        Self { nodes: None, columns: None, every: 1, interval: None, vtk: false }
+        Self { nodes: None, columns: None, every: 1, interval: None, interval_span: 0..0, vtk: false }
     }
 }
 
@@ -40,6 +42,7 @@ pub(super) fn read_output(top: &Table) -> Output {
         columns: texts("columns"),
         every: table.whole_or("every", 1..=MOST_STEPS, 1).unwrap_or(1),
         interval: table.positive("interval").map(|v| v.value),
+        interval_span: table.key_span("interval"),
         vtk: table.flag_or("vtk", false).unwrap_or(false),
     }
 }

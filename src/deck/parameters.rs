@@ -1,7 +1,7 @@
 //! `[param]`: names for numbers, which may be expressions of each other.
 
 use super::diagnostic::{Diagnostic, Span};
-use super::expression::{CONSTANTS, Expression, Jet};
+use super::expression::{CONSTANTS, Expression, Jet, shortened};
 use super::reader::{kind_of, literal};
 use std::collections::{BTreeMap, BTreeSet};
 use toml::de::{DeTable, DeValue};
@@ -36,7 +36,7 @@ impl Parameters {
         }
         let mut parameters = Self::default();
         for name in entries.keys() {
-            parameters.resolve(name, &entries, &mut Vec::new(), diagnostics);
+            parameters.resolve(name, &entries, diagnostics);
         }
         parameters
     }
@@ -60,63 +60,69 @@ impl Parameters {
         broken
     }
 
-    fn resolve(
-        &mut self,
-        name: &str,
-        entries: &BTreeMap<String, Entry>,
-        path: &mut Vec<String>,
-        diagnostics: &mut Vec<Diagnostic>,
-    ) -> Option<f64> {
-        if let Some(&value) = self.values.get(name) {
-            return Some(value);
-        }
-        let entry = entries.get(name)?;
-        if self.broken.contains(name) {
-            return None;
-        }
-        if let Some(start) = path.iter().position(|p| p == name) {
-            let circle = [&path[start..], &[name.to_string()]].concat().join(" -> ");
-            diagnostics.push(Diagnostic::error(
-                format!("parameters refer to each other in a circle: {circle}"),
-                entry.span.clone(),
-            ));
-            self.broken.extend(path[start..].iter().cloned());
-            return None;
-        }
-        if path.len() >= MOST_LINKS {
-            let message = format!("more than {MOST_LINKS} parameters refer to each other in a chain");
-            diagnostics.push(Diagnostic::limit(message, entry.span.clone()));
-            self.broken.extend(path.drain(..));
-            return None;
-        }
-        path.push(name.into());
-        let value = self.value_of(name, entry, entries, path, diagnostics);
-        path.pop();
-        match value {
-            Some(value) => {
-                self.values.insert(name.into(), value);
-            }
-            None => {
-                self.broken.insert(name.into());
+    /// Resolves a parameter after those that it refers to. Parameters that wait for others are on a
+    /// list, not on the call stack.
+    fn resolve(&mut self, name: &str, entries: &BTreeMap<String, Entry>, diagnostics: &mut Vec<Diagnostic>) {
+        let mut path = vec![name.to_string()];
+        while let Some(name) = path.last().cloned() {
+            let Some(entry) = entries.get(&name).filter(|_| !self.is_resolved(&name)) else {
+                path.pop();
+                continue;
+            };
+            let needed = self.unresolved(entry, entries);
+            let Some(next) = needed else {
+                match self.value_of(&name, entry, entries, diagnostics) {
+                    Some(value) => drop(self.values.insert(name, value)),
+                    None => drop(self.broken.insert(name)),
+                }
+                path.pop();
+                continue;
+            };
+            if let Some(start) = path.iter().position(|known| *known == next) {
+                let circle = [&path[start..], &[next.clone()]].concat().join(" -> ");
+                let message = format!("parameters refer to each other in a circle: {circle}");
+                diagnostics.push(Diagnostic::error(message, entries[&next].span.clone()));
+                self.broken.extend(path.drain(start..));
+            } else if path.len() >= MOST_LINKS {
+                let message = format!("more than {MOST_LINKS} parameters refer to each other in a chain");
+                diagnostics.push(Diagnostic::limit(message, entries[&next].span.clone()));
+                self.broken.extend(path.drain(..));
+            } else {
+                path.push(next);
             }
         }
-        value
     }
 
+    /// True if a parameter has a value, or has been reported as wrong.
+    fn is_resolved(&self, name: &str) -> bool {
+        self.values.contains_key(name) || self.broken.contains(name)
+    }
+
+    /// The first parameter that must be resolved before an entry.
+    fn unresolved(&self, entry: &Entry, entries: &BTreeMap<String, Entry>) -> Option<String> {
+        let mut found = None;
+        entry.expression.as_ref()?.names(&mut |name, _| {
+            if found.is_none() && entries.contains_key(name) && !self.is_resolved(name) {
+                found = Some(name.to_string());
+            }
+        });
+        found
+    }
+
+    /// The value of a parameter whose needed parameters are resolved.
     fn value_of(
-        &mut self,
+        &self,
         name: &str,
         entry: &Entry,
         entries: &BTreeMap<String, Entry>,
-        path: &mut Vec<String>,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<f64> {
         let expression = entry.expression.as_ref()?;
         let mut missing = false;
         let evaluated = expression.evaluate(&mut |other| {
-            let value = self.resolve(other, entries, path, diagnostics);
+            let value = self.get(other);
             missing |= value.is_none() && entries.contains_key(other);
-            value.map(|value| [value, 0.0, 0.0])
+            value
         });
         match evaluated {
             Ok([value, ..]) if value.is_finite() => Some(value),
@@ -159,7 +165,7 @@ fn read_entry(item: &toml::Spanned<DeValue>, diagnostics: &mut Vec<Diagnostic>) 
             if number.is_none() {
                 diagnostics.push(Diagnostic::error("this number is too large", item.span()));
             }
-            return number.map(Expression::Number);
+            return number.map(Expression::of_number);
         }
         DeValue::String(text) => text.to_string(),
         other => {
@@ -172,7 +178,10 @@ fn read_entry(item: &toml::Spanned<DeValue>, diagnostics: &mut Vec<Diagnostic>) 
         Ok(expression) => Some(expression),
         Err(error) => {
             let at = item.span().start + 1 + error.offset;
-            diagnostics.push(Diagnostic::error(format!("in the expression `{text}`: {}", error.message), at..at + 1));
+            diagnostics.push(Diagnostic::error(
+                format!("in the expression `{}`: {}", shortened(&text), error.message),
+                at..at + 1,
+            ));
             None
         }
     }

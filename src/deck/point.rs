@@ -2,6 +2,7 @@
 
 use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table, kind_of};
+use super::shown::hides_text;
 use toml::de::DeValue;
 
 /// A place: a name or coordinates.
@@ -21,17 +22,26 @@ pub(super) fn read_points(top: &Table) -> Vec<(Spanned<String>, [f64; 3])> {
 }
 
 /// Refuses names with the punctuation of node names and column names, in which names of points and
-/// beams stand.
+/// beams stand, and names that are dangerous there: spreadsheets carry out cells that begin with
+/// `=`, `+` or `-`, and some characters hide or reorder text.
 pub(super) fn check_name(context: &Context, name: Spanned<String>) -> Option<Spanned<String>> {
     let bad = name.value.chars().find(|c| matches!(c, '@' | ':' | '.' | ',' | '"' | '/' | '\\') || c.is_control());
     if name.value.trim().is_empty() {
         return context.wrong(name.span, "a name must not be empty");
     }
-    match bad {
-        Some(c) => context
-            .wrong(name.span, format!("a name must not contain {c:?}: it would be ambiguous in node and column names")),
-        None => Some(name),
+    if let Some(c) = bad {
+        let message = format!("a name must not contain {c:?}: it would be ambiguous in node and column names");
+        return context.wrong(name.span, message);
     }
+    if let Some(c) = name.value.chars().find(|&c| hides_text(c)) {
+        let message = format!("a name must not contain {c:?}, which hides or reorders text");
+        return context.wrong(name.span, message);
+    }
+    if let Some(c) = name.value.trim_start().chars().next().filter(|c| ['=', '+', '-'].contains(c)) {
+        let message = format!("a name must not begin with `{c}`: a spreadsheet would take its columns for formulas");
+        return context.wrong(name.span, message);
+    }
+    Some(name)
 }
 
 /// A point by its name or its coordinates.

@@ -2,7 +2,7 @@
 //! wrong.
 
 use super::diagnostic::{Diagnostic, Span, Spanned, one_of};
-use super::expression::Expression;
+use super::expression::{Expression, shortened};
 use super::hints::{self, nearest};
 use super::parameters::Parameters;
 use super::words::Words;
@@ -66,8 +66,10 @@ impl Context {
             Err(_) if self.parameters.is_broken(text) => None,
             Err(error) => {
                 let at = span.start + 1 + error.offset;
-                let mut diagnostic =
-                    Diagnostic::error(format!("in the expression `{text}`: {}", error.message), at..at + 1);
+                let mut diagnostic = Diagnostic::error(
+                    format!("in the expression `{}`: {}", shortened(text), error.message),
+                    at..at + 1,
+                );
                 if let Some(name) = error.message.strip_prefix("unknown name `").and_then(|n| n.strip_suffix('`')) {
                     diagnostic.help = Some(if name == "t" {
                         "`t` exists only in the `expr` of a history".into()
@@ -237,7 +239,8 @@ impl<'a> Table<'a> {
                 let list = || format!("keys of {}: {}", self.what, one_of(keys.iter().copied()));
                 let message = format!("unknown key `{name}` in {}", self.what);
                 let help = hint.help().unwrap_or_else(list);
-                self.context.report(Diagnostic::error(message, key.span()).help(help));
+                let error = Diagnostic::error(message, key.span()).help(help);
+                self.context.report(Diagnostic { is_of_key: true, ..error });
             }
         }
     }

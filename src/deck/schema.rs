@@ -220,7 +220,9 @@ fn to_toml(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deck::{self, EffectWord, Frame, InterpolationWord, NormWord, Reduction, SchemeName, Words};
+    use crate::deck::{
+        self, EffectWord, Frame, InterpolationWord, NormWord, Reduction, SchemeName, StationsWord, Words,
+    };
     use beamsim_core::effect::joint::JointKind;
     use beamsim_core::failure::FailureKind;
     use beamsim_core::system::StageKind;
@@ -269,6 +271,7 @@ mod tests {
         let warnings = WarningKind::ALL.iter().map(|kind| kind.name().to_string());
         vec![
             ("beam.interpolation", words::<InterpolationWord>()),
+            ("beam.stations_in", words::<StationsWord>()),
             ("cost.interpolation", words::<InterpolationWord>()),
             ("cost.norm", words::<NormWord>()),
             ("cost.scheme", words::<SchemeName>()),

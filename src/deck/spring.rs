@@ -87,6 +87,9 @@ fn read_between(table: &Table) -> Option<SpringBody> {
     let damping = table.non_negative_or("damping", 0.0);
     let length = table.optional("length", |_, _| table.non_negative("length"));
     let tension_only = table.flag_or("tension_only", false);
+    if !table.has("stiffness") && tension_only == Some(false) {
+        table.refuse("length", "`length` has no effect without `stiffness` or `tension_only`");
+    }
     Some(SpringBody::Between {
         nodes,
         stiffness: stiffness?,

@@ -26,6 +26,14 @@ pub enum OutputError {
     /// Another run writes to a folder of results.
     #[error("{}: another run is writing its results there (wait for it, or give another folder with --out)", .0.display())]
     Locked(PathBuf),
+    /// A path at which something stands that is not replaced.
+    #[error("{} {reason}", path.display())]
+    Occupied {
+        /// The path
+        path: PathBuf,
+        /// What stands there, and what to do
+        reason: String,
+    },
     /// A path that ends in no file name, such as `..`.
     #[error("{}: not a file name", .0.display())]
     NoFileName(PathBuf),

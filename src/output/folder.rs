@@ -8,7 +8,7 @@
 
 use super::files::{FIELDS, PARTIAL_FIELDS};
 use super::record::{FileRecord, Record};
-use super::{OutputError, remove_fields, remove_if_there};
+use super::{OutputError, OutputKind, may_replace, remove_fields, remove_if_there};
 use std::fs::{self, File, TryLockError};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -19,8 +19,19 @@ const LOCK: &str = ".lock";
 const RECORD: &str = "run.json";
 /// The file of a run that can be resumed.
 pub const CHECKPOINT: &str = "checkpoint";
-/// The files that a run may write, beside its fields and its record.
-const TABLES: [&str; 4] = ["history.csv", "history.partial.csv", "modes.csv", "buckling.csv"];
+/// The tables that a run may write, and their kinds.
+const TABLES: [(&str, OutputKind); 4] = [
+    ("history.csv", OutputKind::History),
+    ("history.partial.csv", OutputKind::History),
+    ("modes.csv", OutputKind::Modes),
+    ("buckling.csv", OutputKind::Buckling),
+];
+/// The names of tables.
+fn tables() -> impl Iterator<Item = &'static str> {
+    TABLES.into_iter().map(|(name, _)| name)
+}
+/// The indices of fields.
+const INDICES: [&str; 2] = ["fields.pvd", "fields.partial.pvd"];
 
 /// The name of a file that is not complete.
 fn part(name: &str) -> String {
@@ -39,12 +50,12 @@ pub struct ResultFolder {
 
 impl ResultFolder {
     /// Claims a folder, which is created where it is missing. Fails where another run writes to it,
-    /// or where something is in the way of the results.
-    pub fn claim(path: &Path) -> Result<Self, OutputError> {
+    /// or where something is in the way of the results. With `force` plain files of others are not.
+    pub fn claim(path: &Path, force: bool) -> Result<Self, OutputError> {
         let is_new = !path.exists();
         fs::create_dir_all(path).map_err(|error| OutputError::file(path, error))?;
         let folder = Self { path: path.into(), is_new, lock: lock(path)? };
-        folder.refuse_obstacles()?;
+        folder.refuse_obstacles(force)?;
         complete(path)?;
         Ok(folder)
     }
@@ -56,7 +67,7 @@ impl ResultFolder {
 
     /// Removes what runs that were killed have left unfinished.
     pub fn clean(&self) -> Result<(), OutputError> {
-        for name in TABLES.into_iter().chain([RECORD, CHECKPOINT, "fields.pvd", "fields.partial.pvd"]) {
+        for name in tables().chain([RECORD, CHECKPOINT]).chain(INDICES) {
             remove_if_there(&self.path, &part(name))?;
         }
         let fields = self.path.join(part(FIELDS));
@@ -145,10 +156,14 @@ impl ResultFolder {
     }
 
     /// Refuses what stands in the way of results, before a run begins.
-    fn refuse_obstacles(&self) -> Result<(), OutputError> {
-        for name in TABLES.into_iter().chain([RECORD, CHECKPOINT, "report.html", "fields.pvd", "fields.partial.pvd"]) {
+    fn refuse_obstacles(&self, force: bool) -> Result<(), OutputError> {
+        let others = [(RECORD, OutputKind::Record), ("report.html", OutputKind::Page)];
+        for (name, kind) in TABLES.into_iter().chain(others) {
+            may_replace(&self.path.join(name), kind, force)?;
+        }
+        let parts = tables().chain([RECORD, CHECKPOINT]).chain(INDICES).map(part);
+        for name in parts.chain([CHECKPOINT.into()]).chain(INDICES.map(String::from)) {
             refuse_obstacle(&self.path.join(name))?;
-            refuse_obstacle(&self.path.join(part(name)))?;
         }
         [FIELDS, PARTIAL_FIELDS].iter().try_for_each(|name| self.refuse_foreign_fields(name))
     }
@@ -251,7 +266,7 @@ fn complete(folder: &Path) -> Result<(), OutputError> {
     };
     if let Ok(record) = Record::read_from(&folder.join(part(RECORD))) {
         if record.files.iter().all(|file| is_whole(folder, file)) {
-            TABLES.iter().try_for_each(|name| remove_if_there(folder, name))?;
+            tables().try_for_each(|name| remove_if_there(folder, name))?;
             remove_if_there(folder, "report.html")?;
             remove_fields(folder)?;
             rename(part(RECORD), RECORD)?;
@@ -282,7 +297,7 @@ fn is_whole(folder: &Path, file: &FileRecord) -> bool {
 /// Completes in a folder what a run that was killed has left half-named, unless a run is at work.
 pub fn settle(folder: &Path) {
     if folder.join(part(RECORD)).exists() || Record::read(folder).is_ok_and(|record| record.misses_files(folder)) {
-        drop(ResultFolder::claim(folder));
+        drop(ResultFolder::claim(folder, false));
     }
 }
 

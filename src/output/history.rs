@@ -4,6 +4,7 @@ use super::{OutputError, Record, ResultFolder, settle};
 use beamsim_core::probe::clocks;
 use beamsim_core::run::Moment;
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use std::fmt::Write;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -345,7 +346,12 @@ impl HistoryReader {
         let wrong = |message: String| OutputError::content(path, message);
         let file = File::open(path).map_err(|error| OutputError::file(path, error))?;
         let mut reader = csv::Reader::from_reader(file);
-        let names = reader.headers().map_err(|e| wrong(e.to_string()))?.iter().map(str::to_string).collect();
+        let names: Vec<String> =
+            reader.headers().map_err(|e| wrong(e.to_string()))?.iter().map(str::to_string).collect();
+        let mut known = HashSet::new();
+        if let Some(name) = names.iter().find(|name| !known.insert(name.as_str())) {
+            return Err(wrong(format!("two columns are called `{name}`")));
+        }
         let mut rows = Vec::new();
         for (number, record) in reader.records().enumerate() {
             let record = record.map_err(|e| wrong(e.to_string()))?;
@@ -356,12 +362,36 @@ impl HistoryReader {
         }
         Ok(Self { names, rows })
     }
+
+    /// The first number that is not finite, in words.
+    pub fn first_not_finite(&self) -> Option<String> {
+        self.rows.iter().enumerate().find_map(|(row, cells)| {
+            let column = cells.iter().position(|number| !number.is_finite())?;
+            Some(format!("row {}: `{}` is {}, not a finite number", row + 1, self.names[column], cells[column]))
+        })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::fs;
+
+    #[test]
+    fn tables_of_others_are_checked() {
+        let path = std::env::temp_dir().join(format!("beamsim-history-{}.csv", std::process::id()));
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            HistoryReader::read(&path)
+        };
+        let twice = read("time,a,a\n0,1,2\n").unwrap_err().to_string();
+        assert!(twice.contains("two columns are called `a`"), "{twice}");
+        assert!(read("time,a\n0,x\n").is_err() && read("time,a\n0,1,2\n").is_err());
+        assert_eq!(read("time,a\n0,1\n").unwrap().first_not_finite(), None);
+        let not_finite = read("time,a\n0,1\n1,nan\n").unwrap().first_not_finite();
+        assert_eq!(not_finite.as_deref(), Some("row 2: `a` is NaN, not a finite number"));
+        std::fs::remove_file(&path).unwrap();
+    }
 
     #[test]
     fn half_a_row_is_cut_off() {

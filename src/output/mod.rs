@@ -1,6 +1,7 @@
 //! The files of results. A file gets its name when it is complete: no name ever stands for half a
 //! result.
 
+mod cells;
 mod checkpoint;
 mod error;
 mod fields;
@@ -9,11 +10,13 @@ mod folder;
 mod history;
 pub(crate) mod json;
 mod modes;
+mod ownership;
 mod plot;
 mod quantities;
 mod record;
 mod report;
 
+pub use cells::harmless;
 pub use checkpoint::{Found, SavedRun};
 pub use error::OutputError;
 pub use fields::{FieldsPlace, FieldsWriter};
@@ -23,7 +26,11 @@ pub use history::{
     BarsPlace, CompanionPlace, HistoryPlace, HistoryReader, HistoryWriter, Row, RowCounter, Rows, SideColumns,
 };
 pub use modes::ModesWriter;
+pub use ownership::{OutputKind, may_replace};
 pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale};
 pub use quantities::{Units, quantity_of};
-pub use record::{FileRecord, FinishedRun, ReachedAccuracy, ReachedColumn, Record, RunSummary, WarningRecord};
+pub use record::{
+    DeckSource, FileRecord, FinishedRun, ReachedAccuracy, ReachedColumn, Record, RunSummary, TableRecord, TableSource,
+    WarningRecord,
+};
 pub use report::{Film, Reel, Report};

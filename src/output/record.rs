@@ -2,6 +2,7 @@
 
 use super::json::{Entries, Number};
 use super::{OutputError, Units};
+use crate::deck::{self, ImportedTable};
 use crate::scene::{Reason, Scene};
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
@@ -10,7 +11,7 @@ use serde_json::Value;
 use std::fmt::{self, Display, Formatter};
 use std::fs::{self, File};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
 /// Bytes of a file that are read at once
@@ -31,10 +32,29 @@ pub struct FinishedRun<'a> {
     pub threads: usize,
     /// The wanted accuracy and how far it was reached
     pub accuracy: Option<ReachedAccuracy>,
-    /// The text of the deck
-    pub text: String,
+    /// The deck
+    pub source: DeckSource,
     /// How often the run was resumed
     pub resumed: u32,
+}
+
+/// The text of a deck, and the long tables beside it. Their rows are not repeated in run.json: a
+/// report reads them from their files, and finds by the fingerprint if they have changed.
+#[derive(Clone, Debug, Default)]
+pub struct DeckSource {
+    /// The text, with the settings of the command line and the rows of short tables
+    pub text: String,
+    /// The long tables
+    pub tables: Vec<TableSource>,
+}
+
+/// A table beside a deck.
+#[derive(Clone, Debug)]
+pub struct TableSource {
+    /// The path of its file
+    pub path: PathBuf,
+    /// Its name in the deck, rows and fingerprint
+    pub table: ImportedTable,
 }
 
 /// A wanted accuracy, and what was reached.
@@ -76,6 +96,9 @@ pub struct Record {
     deck: Value,
     #[serde(skip_serializing_if = "Option::is_none")]
     text: Option<String>,
+    /// The tables beside the deck whose rows are not in its text
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    tables: Vec<TableRecord>,
     #[serde(flatten)]
     findings: Findings,
 }
@@ -112,6 +135,20 @@ impl FileRecord {
         }
         Ok(Self { name: name.into(), bytes, checksum: format!("{:016x}", hasher.digest()) })
     }
+}
+
+/// A table beside the deck.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct TableRecord {
+    /// Its name in the deck
+    pub csv: String,
+    /// The path of its file; not UTF-8 characters are replaced
+    pub path: String,
+    /// The number of its rows
+    pub rows: usize,
+    /// A fingerprint of its file
+    pub hash: String,
 }
 
 /// The part of run.json that does not repeat the deck.
@@ -273,7 +310,7 @@ impl<'a> RunSummary<'a> {
 impl Record {
     /// The record of a run.
     pub fn of(scene: &Scene, run: FinishedRun) -> Self {
-        let FinishedRun { result, counters, seconds, threads, accuracy, text, resumed } = run;
+        let FinishedRun { result, counters, seconds, threads, accuracy, source, resumed } = run;
         let found = &counters.findings;
         let warnings = scene.warnings.iter().chain(&found.warnings);
         let findings = Findings {
@@ -297,8 +334,9 @@ impl Record {
             status: result.as_ref().map_or_else(Failure::name, |()| FINISHED).into(),
             files: Vec::new(),
             resumed,
-            deck: scene.resolved.clone(),
-            text: Some(text),
+            deck: resolved(&source).unwrap_or_else(|| scene.resolved.clone()),
+            tables: source.tables.iter().map(TableRecord::from).collect(),
+            text: Some(source.text),
             findings,
         }
     }
@@ -338,6 +376,11 @@ impl Record {
         self.text.as_deref()
     }
 
+    /// The tables beside the deck.
+    pub fn tables(&self) -> &[TableRecord] {
+        &self.tables
+    }
+
     /// The title of the deck.
     pub fn title(&self) -> Option<&str> {
         self.deck["title"].as_str()
@@ -361,6 +404,23 @@ impl Record {
     /// The record without the text of the deck.
     pub fn bare(&self) -> Self {
         Self { text: None, ..self.clone() }
+    }
+}
+
+/// The tables of a deck with numbers for expressions, and without the rows of long tables; `None` if
+/// it imports none.
+fn resolved(source: &DeckSource) -> Option<Value> {
+    if source.tables.is_empty() {
+        return None;
+    }
+    // Readers complain of names of files, which they do not know.
+    deck::read(&source.text).ok().map(|(deck, _)| deck.resolved)
+}
+
+impl From<&TableSource> for TableRecord {
+    fn from(source: &TableSource) -> Self {
+        let ImportedTable { name, rows, hash } = &source.table;
+        Self { csv: name.clone(), path: source.path.display().to_string(), rows: *rows, hash: hash.clone() }
     }
 }
 
@@ -550,7 +610,7 @@ mod tests {
 
     const RECORD: &str = r#"{
         "version": "0.1.0", "status": "singular", "deck": { "param": { "L": 1.0 }, "beam": [{ "elements": 4 }] },
-        "text": "a deck", "effects": [{ "name": "shear", "active": true, "reason": "GA" }],
+        "text": "a deck", "tables": [{ "csv": "f.csv", "path": "/a/f.csv", "rows": 2, "hash": "xxh3:00" }], "effects": [{ "name": "shear", "active": true, "reason": "GA" }],
         "counters": {
             "steps": 1, "cutbacks": 0, "uncertainty": 1e-12, "iterations": 3, "factorisations": 3,
             "chart_switches": 0, "mixed_elements": 0, "evaluations": { "z": 2, "a": 1 },

@@ -8,7 +8,7 @@ use beamsim_core::system::Direction;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
 use nalgebra::{Matrix3, SymmetricEigen};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Checks names, stages, and what a stage needs.
 pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
@@ -22,19 +22,19 @@ pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     clocks_go_forward(deck, diagnostics);
     mass_where_needed(deck, diagnostics);
     warn_of_equal_places(deck, diagnostics);
-    warn_of_idle_initials(deck, diagnostics);
+    refuse_idle_tables(deck, diagnostics);
     refuse_vectors_where_there_are_increments(deck, diagnostics);
     refuse_histories_on_paths(deck, diagnostics);
 }
 
 fn refuse_twins<'a>(kind: &str, names: impl Iterator<Item = &'a Spanned<String>>, diagnostics: &mut Vec<Diagnostic>) {
-    let mut known: Vec<&Spanned<String>> = Vec::new();
+    let mut known: HashMap<&str, &Spanned<String>> = HashMap::new();
     for name in names {
-        if let Some(first) = known.iter().find(|k| k.value == name.value) {
+        let first = known.entry(&name.value).or_insert(name);
+        if !std::ptr::eq(*first, name) {
             let diagnostic = Diagnostic::error(format!("there are two {kind}s `{}`", name.value), name.span.clone());
             diagnostics.push(diagnostic.context(first.span.clone(), "the first"));
         }
-        known.push(name);
     }
 }
 
@@ -108,27 +108,36 @@ fn missing_mass(deck: &Deck, section: &deck::Section) -> Option<Missing> {
 
 /// Points at one place are not joined.
 fn warn_of_equal_places(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let used = |name: &str| {
-        deck.beams.iter().any(|beam| match &beam.path {
-            deck::Path::Through(points) => points.iter().any(|p| p.value == deck::PointRef::Name(name.into())),
-            deck::Path::Arc(points) => points.iter().any(|p| p.value == deck::PointRef::Name(name.into())),
-        })
-    };
-    for (k, (name, place)) in deck.points.iter().enumerate() {
-        for (other, there) in &deck.points[..k] {
-            if place == there && used(&name.value) && used(&other.value) {
-                let message = format!(
-                    "the points `{}` and `{}` have the same coordinates but are not connected",
-                    other.value, name.value
-                );
-                let diagnostic = Diagnostic::warning(WarningKind::EqualPlaces, message, name.span.clone());
-                diagnostics.push(diagnostic.help("beams are connected where they use the same point name"));
+    let mut used: HashSet<&str> = HashSet::new();
+    for beam in &deck.beams {
+        let points = match &beam.path {
+            deck::Path::Through(points) => &points[..],
+            deck::Path::Arc(points) => &points[..],
+        };
+        for point in points {
+            if let deck::PointRef::Name(name) = &point.value {
+                used.insert(name);
             }
+        }
+    }
+    // Places are compared as numbers: -0 is 0.
+    let key = |place: &[f64; 3]| place.map(|x| (x + 0.0).to_bits());
+    let mut at_place: HashMap<[u64; 3], &Spanned<String>> = HashMap::new();
+    for (name, place) in deck.points.iter().filter(|(name, _)| used.contains(name.value.as_str())) {
+        let first = at_place.entry(key(place)).or_insert(name);
+        if !std::ptr::eq(*first, name) {
+            let message = format!(
+                "the points `{}` and `{}` have the same coordinates but are not connected",
+                first.value, name.value
+            );
+            let diagnostic = Diagnostic::warning(WarningKind::EqualPlaces, message, name.span.clone());
+            diagnostics.push(diagnostic.help("beams are connected where they use the same point name"));
         }
     }
 }
 
-fn warn_of_idle_initials(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+/// Refuses what only dynamic stages use where there is none.
+fn refuse_idle_tables(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     let dynamic = deck.stages.iter().any(|s| s.body.kind().advances_time());
     if dynamic || deck.stages.is_empty() {
         return;
@@ -136,6 +145,11 @@ fn warn_of_idle_initials(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     if let Some(initial) = deck.initials.first() {
         let message = "[[initial]] needs a dynamic stage: this deck has none";
         diagnostics.push(Diagnostic::error(message, initial.span.clone()));
+    }
+    if deck.output.interval.is_some() {
+        let message = "`interval` of [output] is a time and needs a dynamic stage: this deck has none";
+        diagnostics
+            .push(Diagnostic::error(message, deck.output.interval_span.clone()).help("`every` writes each n-th row"));
     }
 }
 

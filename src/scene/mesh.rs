@@ -3,7 +3,7 @@
 use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
-use crate::deck::{self, Deck, Diagnostic, JointParts, PointRef, Spanned};
+use crate::deck::{self, Deck, Diagnostic, JointParts, PointRef, Spanned, StationsWord};
 use beamsim_core::model::Names;
 use beamsim_core::model::beam_element::{ElementGeometry, PlacedNode, Rule, Station, shape_at};
 use beamsim_core::system::Node;
@@ -308,13 +308,15 @@ impl Mesh {
             }
         };
         let line = path::centre_line(beam, &|point| names::place(deck, point))?;
-        let section = section.along(line.length).map_err(|last| {
+        let section = section.along(line.length, beam.stations_in).map_err(|last| {
             let span = beam.stations.as_ref().map_or(beam.span.clone(), |stations| stations.span.clone());
-            let message = format!(
-                "the last of the `stations` is {last}; it must be 1 (a fraction) or the length of the beam, {}",
-                line.length
-            );
-            Diagnostic::error(message, span)
+            let length = line.length;
+            let end = match beam.stations_in {
+                None => format!("1 (a fraction) or the length of the beam, {length}"),
+                Some(StationsWord::Fraction) => "1, since they are fractions of the length".into(),
+                Some(StationsWord::Length) => format!("the length of the beam, {length}"),
+            };
+            Diagnostic::error(format!("the last of the `stations` is {last}; it must be {end}"), span)
         })?;
         let pieces = line.pieces.len();
         for (key, list) in [("elements", Some(&beam.elements)), ("numbering", beam.numbering.as_ref())] {

@@ -5,6 +5,7 @@ mod compose;
 mod constraints;
 mod figure;
 mod joints;
+mod memory;
 mod mesh;
 mod names;
 mod output;
@@ -183,12 +184,25 @@ pub fn from_deck(deck: &Deck, mut diagnostics: Vec<Diagnostic>) -> Result<(Scene
     diagnostics.append(&mut found);
     diagnostics.sort_by_key(Diagnostic::is_warning);
     let mut told: Vec<Diagnostic> = Vec::new();
+    let mut hidden = 0;
+    let mut hides_errors = false;
     for diagnostic in diagnostics {
         let again =
             |known: &Diagnostic| known == &diagnostic || (known.unknown.is_some() && known.span == diagnostic.span);
-        if told.len() < MOST_DIAGNOSTICS && !told.iter().any(again) {
-            told.push(diagnostic);
+        if told.iter().any(again) {
+            continue;
         }
+        if told.len() < MOST_DIAGNOSTICS {
+            told.push(diagnostic);
+        } else {
+            hidden += 1;
+            hides_errors |= !diagnostic.is_warning();
+        }
+    }
+    if hides_errors {
+        told.push(Diagnostic::whole(format!("{hidden} more messages are not shown: correct the first ones")));
+    } else if let Some(last) = told.last_mut().filter(|_| hidden > 0) {
+        last.message += &format!(" ({hidden} more warnings are not shown)");
     }
     match scene {
         Some(scene) if told.iter().all(Diagnostic::is_warning) => {
@@ -219,6 +233,11 @@ fn about(name: &str, table: &str) -> bool {
 pub fn build(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
     check::deck(deck, diagnostics);
     switches::refuse_impossible(deck, diagnostics);
+    let before = diagnostics.len();
+    memory::check(deck, diagnostics);
+    if diagnostics.len() > before {
+        return None;
+    }
     let mesh = Mesh::new(deck, diagnostics);
     build_on(deck, mesh, diagnostics)
 }

@@ -36,16 +36,26 @@ pub fn points(deck: &Deck) -> impl Iterator<Item = &str> {
     deck.points.iter().map(|(name, _)| name.value.as_str())
 }
 
+/// Names with which a misspelt one is compared, at most.
+const MOST_COMPARED: usize = 2000;
+
+/// Names that a message lists, at most.
+const MOST_NAMES: usize = 12;
+
 /// "there is no section `x`", with what was probably meant.
 pub fn unknown<'a>(kind: &str, name: &Spanned<String>, known: impl Iterator<Item = &'a str>) -> Diagnostic {
     let known: Vec<&str> = known.collect();
     let mut diagnostic = Diagnostic::error(format!("there is no {kind} `{}`", name.value), name.span.clone());
     diagnostic.unknown = Some(name.value.clone());
-    match nearest(&name.value, known.iter().copied()) {
+    match nearest(&name.value, known.iter().copied().take(MOST_COMPARED)) {
         Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
         None if known.is_empty() => diagnostic.help(format!("the deck defines no {kind}")),
-        None if known.len() <= 12 => diagnostic.help(format!("choose {}", one_of(known))),
-        None => diagnostic,
+        None if known.len() <= MOST_NAMES => diagnostic.help(format!("choose {}", one_of(known))),
+        None => {
+            let first = known[..MOST_NAMES].iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+            let more = known.len() - MOST_NAMES;
+            diagnostic.help(format!("the deck has {first} and {more} more"))
+        }
     }
 }
 

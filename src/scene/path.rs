@@ -170,7 +170,14 @@ pub fn centre_line(
     beam: &deck::Beam,
     place: &dyn Fn(&Spanned<PointRef>) -> Result<Vec3, Diagnostic>,
 ) -> Result<CentreLine, Diagnostic> {
-    let given = beam.axis3.as_ref().map(|axis| Spanned { value: Vec3(axis.value), span: axis.span.clone() });
+    // Only the direction counts, but squares of very large or very small components overflow or
+    // vanish.
+    let ordinary = |axis: Vec3| axis == Vec3::ZERO || (1e-100..1e100).contains(&axis.max_abs());
+    let given = beam.axis3.as_ref().map(|axis| {
+        let value = Vec3(axis.value);
+        let value = if ordinary(value) { value } else { value.normalized().unwrap_or(value) };
+        Spanned { value, span: axis.span.clone() }
+    });
     if let Some(axis) = given.as_ref().filter(|axis| axis.value == Vec3::ZERO) {
         return Err(Diagnostic::error("`axis3` must not be zero", axis.span.clone()));
     }

@@ -1,6 +1,6 @@
 //! Sections as matrices in their local axes, from resultants, full matrices, or shape and material.
 
-use crate::deck::{self, Diagnostic, EffectWord, Effects, SectionBody, Shape, Span, Spanned};
+use crate::deck::{self, Diagnostic, EffectWord, Effects, SectionBody, Shape, Span, Spanned, StationsWord};
 use beamsim_core::model::{MassPerLength, SectionMatrices};
 use beamsim_core::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix6, SymmetricEigen};
@@ -72,12 +72,19 @@ impl SectionCourse {
         }
     }
 
-    /// With stations as fractions of the length; `Err` with the last where it is neither 1 nor the
-    /// length.
-    pub fn along(self, length: f64) -> Result<Self, f64> {
+    /// With stations as fractions of the length; `Err` with the last where it is not the end of the
+    /// beam. Without a unit, 1 as well as the length is the end.
+    pub fn along(self, length: f64, unit: Option<StationsWord>) -> Result<Self, f64> {
         let Self::Stations { fractions, courses } = self else { return Ok(self) };
         let last = fractions.last().copied().unwrap_or(1.0);
-        if last != 1.0 && (last - length).abs() > SAME_LENGTH * length {
+        let is_whole = last == 1.0;
+        let is_length = (last - length).abs() <= SAME_LENGTH * length;
+        let is_end = match unit {
+            None => is_whole || is_length,
+            Some(StationsWord::Fraction) => is_whole,
+            Some(StationsWord::Length) => is_length,
+        };
+        if !is_end {
             return Err(last);
         }
         Ok(Self::Stations { fractions: fractions.iter().map(|s| s / last).collect(), courses })

@@ -2,8 +2,9 @@
 
 use super::change::{self, Change};
 use super::error::StudyError;
-use crate::deck::{self, Deck, Diagnostic};
+use crate::deck::{self, Deck, Diagnostic, Severity};
 use crate::scene::{self, Scene};
+use beamsim_core::failure::FailureKind;
 
 /// A deck with its scene.
 pub struct BuiltDeck {
@@ -31,9 +32,17 @@ impl BuiltDeck {
 
 /// The first error, with its advice.
 fn first(found: Vec<Diagnostic>) -> StudyError {
-    let error = found.into_iter().find(|diagnostic| !diagnostic.is_warning());
-    StudyError::NoScene(error.map_or("there is no such scene".into(), |error| match error.help {
+    let Some(error) = found.into_iter().find(|diagnostic| !diagnostic.is_warning()) else {
+        return StudyError::no_scene("there is no such scene".into());
+    };
+    let kind = match error.severity {
+        Severity::Limit => FailureKind::Limit,
+        Severity::File => FailureKind::Io,
+        Severity::Error | Severity::Warning(_) => FailureKind::Deck,
+    };
+    let message = match error.help {
         Some(help) => format!("{}: {help}", error.message),
         None => error.message,
-    }))
+    };
+    StudyError::NoScene { message, kind }
 }

@@ -86,7 +86,7 @@ pub fn apply(deck: &Deck, changes: &[Change]) -> Result<Deck, StudyError> {
     for change in changes {
         change
             .apply(&mut changed)
-            .ok_or_else(|| StudyError::NoScene(format!("`{change}` is not a value of the deck")))?;
+            .ok_or_else(|| StudyError::no_scene(format!("`{change}` is not a value of the deck")))?;
     }
     Ok(changed)
 }

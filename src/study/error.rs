@@ -2,6 +2,7 @@
 
 use crate::deck::Diagnostic;
 use crate::output::OutputError;
+use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 use thiserror::Error;
 
@@ -12,8 +13,13 @@ pub enum StudyError {
     #[error("{}", .0.message)]
     Deck(Diagnostic),
     /// A changed deck describes no scene.
-    #[error("{0}")]
-    NoScene(String),
+    #[error("{message}")]
+    NoScene {
+        /// The reason
+        message: String,
+        /// The kind of error: a wrong deck, or one that exceeds a limit
+        kind: FailureKind,
+    },
     /// A changed deck has other outputs than the deck itself.
     #[error("its outputs differ from those of the deck")]
     OtherOutputs,
@@ -29,6 +35,23 @@ pub enum StudyError {
     /// The points of a sweep cannot be made.
     #[error(transparent)]
     Sweep(#[from] SweepError),
+}
+
+impl StudyError {
+    /// The error of a changed deck that is wrong.
+    pub fn no_scene(message: String) -> Self {
+        Self::NoScene { message, kind: FailureKind::Deck }
+    }
+
+    /// The kind of failure that it is.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            Self::NoScene { kind, .. } => *kind,
+            Self::Failure(failure) => failure.kind(),
+            Self::Output(_) => FailureKind::Io,
+            Self::Deck(_) | Self::OtherOutputs | Self::Comparison(_) | Self::Sweep(_) => FailureKind::Deck,
+        }
+    }
 }
 
 impl From<Diagnostic> for StudyError {

@@ -3,7 +3,7 @@
 use super::generate::Corpus;
 use super::input::{Input, Language, TABLE};
 use super::process;
-use beamsim::deck::{self, Beam, Deck, Diagnostic, Expression, Path, SweepFile};
+use beamsim::deck::{self, Beam, Deck, Diagnostic, Expression, Path, Severity, SweepFile, Unreadable};
 use beamsim::output::HistoryReader;
 use beamsim::{scene, study};
 use std::panic::{self, AssertUnwindSafe};
@@ -55,9 +55,12 @@ pub fn whole_text(input: &Input, corpus: &Corpus) -> Result<String, Verdict> {
     let open = |name: &str| match (&input.table, corpus.table(name)) {
         (Some(table), _) if name == TABLE => Ok(table.clone()),
         (_, Some(table)) => Ok(table.to_string()),
-        (_, None) => Err("there is no such file".to_string()),
+        (_, None) => {
+            let message = "there is no such file".into();
+            Err(Unreadable { message, severity: Severity::File })
+        }
     };
-    deck::import(&text, &open).map_err(|found| refusal(&text, &found))
+    deck::import(&text, &open).map(|imported| imported.text).map_err(|found| refusal(&text, &found))
 }
 
 fn inspect_deck(input: &Input, corpus: &Corpus) -> Verdict {

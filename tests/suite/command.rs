@@ -725,7 +725,38 @@ fn tables_beside_a_deck_are_read_from_its_folder() {
     folder.write("lost.toml", &tables);
     let lost = folder.beamsim(&["run", "lost.toml"]);
     let told = String::from_utf8_lossy(&lost.stderr);
-    assert!(status(&lost) == 2 && told.contains("lost.toml:3:") && told.contains("spine.csv"), "{told}");
+    assert!(status(&lost) == 4 && told.contains("lost.toml:3:") && told.contains("spine.csv"), "{told}");
+    assert!(last_line(&lost).starts_with("error[io]: "), "{}", last_line(&lost));
+}
+
+/// Of a long table run.json keeps path, rows and fingerprint; a report reads it again, if it is the
+/// same.
+#[test]
+fn long_tables_are_not_copied_into_records() {
+    let folder = Folder::new("long_tables");
+    let rows: String = (0..3000).map(|k| format!("{k},{}\n", k % 7)).collect();
+    folder.write("gust.csv", &format!("time,lift\n{rows}"));
+    let history = "[history.gust]\ncsv = \"gust.csv\"\n";
+    let deck = GOOD.replace("force = [0, 0, \"f\"]", "force = [0, 0, \"f\"]\nhistory = \"gust\"") + history;
+    folder.write("deck.toml", &deck);
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--set", "param.f=0.1", "--out", "r"])), 0);
+    let text = fs::read_to_string(folder.0.join("r/run.json")).unwrap();
+    assert!(text.len() < 10_000, "{} bytes", text.len());
+    let record: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let table = &record["tables"][0];
+    assert_eq!((&table["csv"], &table["rows"]), (&"gust.csv".into(), &3000.into()));
+    assert!(Path::new(table["path"].as_str().unwrap()).is_absolute() && table["hash"].as_str().is_some());
+    assert_eq!(record["deck"]["history"]["gust"]["csv"], "gust.csv");
+    assert_eq!((&record["deck"]["param"]["f"], &record["deck"]["load"][0]["force"][2]), (&0.1.into(), &0.1.into()));
+    for command in [&["report", "r"][..], &["plot", "r"], &["compare", "r/history.csv", "r/history.csv"]] {
+        let output = folder.beamsim(command);
+        assert_eq!(status(&output), 0, "{command:?}: {}", last_line(&output));
+    }
+    folder.write("gust.csv", "time,lift\n0,1\n");
+    let changed = folder.beamsim(&["report", "r"]);
+    assert!(status(&changed) == 4 && last_line(&changed).contains("has changed"), "{}", last_line(&changed));
+    fs::remove_file(folder.0.join("gust.csv")).unwrap();
+    assert_eq!(status(&folder.beamsim(&["report", "r"])), 4);
 }
 
 /// Numbers near the limits of floating point, and scenes far from the origin.

@@ -57,7 +57,7 @@ const CRATES: [(&str, &[&str]); 19] = [
     ),
     ("serde", &["src/output/", "src/study/", "src/cli/json.rs", "core/src/"]),
     ("postcard", &["src/output/checkpoint.rs"]),
-    ("xxhash_rust", &["src/output/"]),
+    ("xxhash_rust", &["src/output/", "src/deck/import.rs"]),
     ("thiserror", &["src/output/", "src/study/", "src/cli/"]),
 ];
 

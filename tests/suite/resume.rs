@@ -1,6 +1,7 @@
 //! Runs that go on from a checkpoint end with the same results as runs that never stopped, to the
 //! last bit: all decks, each stopped at a random row.
 
+use beamsim::deck::{Severity, Unreadable};
 use beamsim::scene::{self, Scene};
 use beamsim_core::run::{Checkpoint, Counters, Failure, Observer, Run, Snapshot, StageResult, Warning};
 use beamsim_core::threads;
@@ -127,9 +128,10 @@ fn decks(folder: &Path, found: &mut Vec<PathBuf>) {
 /// The scene of a deck; `None` where it is wrong, as some decks are meant to be.
 fn scene_of(path: &Path) -> Option<Scene> {
     let text = std::fs::read_to_string(path).unwrap();
-    let beside = |name: &str| std::fs::read_to_string(path.with_file_name(name)).map_err(|error| error.to_string());
-    let text = beamsim::deck::import(&text, &beside).ok()?;
-    scene::from_text(&text).ok().map(|(scene, _)| scene)
+    let unreadable = |error: std::io::Error| Unreadable { message: error.to_string(), severity: Severity::File };
+    let beside = |name: &str| std::fs::read_to_string(path.with_file_name(name)).map_err(unreadable);
+    let imported = beamsim::deck::import(&text, &beside).ok()?;
+    scene::from_text(&imported.text).ok().map(|(scene, _)| scene)
 }
 
 #[test]

@@ -92,7 +92,7 @@ fn a_point_that_fails_is_a_row_and_stops_no_other() {
     assert_eq!(status(&output), 3);
     assert_eq!(
         last_line(&output),
-        "error[sweep]: 4 of 6 points did not finish: 2 `deck` (point 3, …), 2 `singular` (point 2, …)"
+        "error[sweep]: 4 of 6 points did not finish: 2 `deck` (point 3 and 1 more), 2 `singular` (point 2 and 1 more)"
     );
     let path = folder.0.join("results/deck/sweep.csv");
     let rows = table(&path);
@@ -184,6 +184,9 @@ fn wrong_words_for_a_sweep_are_told() {
         (&["--vary", "param.L=1,2", "--only", "3"], "points are numbers from 1 to 2"),
         (&["--vary", "param.L"], "expected KEY=V1,V2"),
         (&[], "no key is varied"),
+        (&["--vary", "param.L=1,2", "--vary", "param.L=3,4"], "`param.L` is varied twice"),
+        (&["--vary", "section.s.EX=1,2"], "unknown key `EX`"),
+        (&["--vary", "beam.0.elments=1,2"], "did you mean `elements`?"),
     ] {
         let output = folder.beamsim(&[&["sweep", "deck.toml"], words].concat());
         assert!(status(&output) == 2 && last_line(&output).contains(told), "{words:?}: {}", last_line(&output));
@@ -202,7 +205,11 @@ fn points_that_are_run_one_by_one_are_gathered_to_the_same_table() {
     fine(&with(&["--out", "parts", "--only", "1-2"]));
     assert!(!folder.0.join("parts/sweep.csv").exists());
     let early = with(&["--out", "parts", "--gather"]);
-    assert!(status(&early) == 3 && last_line(&early).contains("2 `missing` (point 3, …)"), "{}", last_line(&early));
+    assert!(
+        status(&early) == 3 && last_line(&early).contains("2 `missing` (point 3 and 1 more)"),
+        "{}",
+        last_line(&early)
+    );
     fine(&with(&["--out", "parts", "--only", "4,3"]));
     fine(&with(&["--out", "parts", "--gather"]));
     let of = |path: &str| fs::read(folder.0.join(path)).unwrap();

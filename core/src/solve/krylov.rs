@@ -82,6 +82,9 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
                 return None;
             }
         }
+        if space.basis.is_empty() {
+            return Some(Spectrum::default());
+        }
         if space.basis.len() == first {
             return space.into_spectrum(operator.is_symmetric(), wanted);
         }

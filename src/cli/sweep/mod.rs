@@ -1,5 +1,6 @@
 //! `beamsim sweep`
 
+mod alone;
 mod local;
 mod plan;
 mod slurm;
@@ -7,10 +8,11 @@ mod slurm;
 use super::error::CommandError;
 use super::status::Status;
 use super::verdict::Verdict;
-use super::{console, json, signals};
-use crate::output::{OutputError, PartFile};
+use super::{console, json, outputs, signals};
+use crate::output::{OutputError, OutputKind, PartFile};
 use crate::study::sweep::PointResult;
-use plan::Plan;
+use beamsim_core::failure::FailureKind;
+use plan::{Again, Plan};
 use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -90,6 +92,9 @@ struct Part {
     /// Run failed points again
     #[arg(long)]
     redo: bool,
+    /// Run points again whose process died
+    #[arg(long)]
+    retry: bool,
 }
 
 /// Runs a sweep, or a part of one.
@@ -112,13 +117,16 @@ fn one(wanted: &SweepArguments) -> Result<(), CommandError> {
     }
     if let Some(words) = &part.only {
         let points = chosen(words, plan.sweep.points.len())?;
-        let failed = local::run(&plan, &points, wanted.threads)?;
+        let failed = local::run(&plan, &points, wanted.threads, None)?;
         return failures(failed, points.len());
     }
+    outputs::check_folder(&plan.folder, &[("sweep.csv", OutputKind::Sweep)])?;
     if !part.gather {
-        let open = plan.open(part.redo);
+        // A job array is told from outside what it may take, and may succeed with more.
+        let again = Again { failed: part.redo, killed: part.redo || part.retry || wanted.engine == Engine::Slurm };
+        let open = plan.open(again);
         match wanted.engine {
-            Engine::Local => local::run(&plan, &open, wanted.threads).map(|_| ())?,
+            Engine::Local => local::run_all(&plan, &open, wanted)?,
             Engine::Slurm => slurm::run(&plan, &open, wanted)?,
         }
     }
@@ -197,10 +205,17 @@ fn summarise(plan: &Plan, results: &[Option<PointResult>]) -> Result<(), Command
         return Ok(());
     }
     let kinds = failed.iter().map(|(name, points)| {
-        let more = if points.len() > 1 { ", …" } else { "" };
+        let more = if points.len() > 1 { format!(" and {} more", points.len() - 1) } else { String::new() };
         format!("{} `{name}` (point {}{more})", points.len(), points[0])
     });
     let kinds = kinds.collect::<Vec<_>>().join(", ");
+    if failed.keys().eq([FailureKind::Deck.name()].iter()) && finished == 0 {
+        let why = known.first().map_or("", |result| &result.message);
+        return Err(CommandError::deck(format!("no point can be run: {why}")));
+    }
+    if failed.contains_key(PointResult::KILLED) {
+        console::note("hint: points that were killed are tried again with --retry");
+    }
     let message = format!("{} of {} points did not finish: {kinds}", results.len() - finished, results.len());
     match signals::caught() {
         Some(signal) => {

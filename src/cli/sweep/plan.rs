@@ -11,6 +11,15 @@ use crate::study::SweepError;
 use crate::study::sweep::{Combination, PointResult, Range, Store, Sweep, SweepAxis, Values, usual_outputs};
 use std::path::{Path, PathBuf};
 
+/// Points with results that are run again.
+#[derive(Clone, Copy, Debug)]
+pub struct Again {
+    /// Those that failed
+    pub failed: bool,
+    /// Those whose process died
+    pub killed: bool,
+}
+
 /// A sweep with its place.
 pub struct Plan {
     /// Name of the deck, or of the sweep.toml
@@ -26,17 +35,17 @@ pub struct Plan {
 impl Plan {
     /// Reads the deck and what is varied of it.
     pub fn of(wanted: &SweepArguments) -> Result<Self, CommandError> {
-        let text = load::text(&wanted.file)?;
+        let text = load::deck_text(&wanted.file)?;
         let given = if SweepFile::is_one(&text) { Some(read(&wanted.file, &text)?) } else { None };
         let file = given.clone().unwrap_or_default();
         let usage = |error: SweepError| CommandError::Usage(error.to_string());
 
         let mut axes = file.vary.iter().map(axis).collect::<Result<Vec<_>, _>>().map_err(usage)?;
-        for text in &wanted.vary {
-            let axis = SweepAxis::parse(text).map_err(usage)?;
-            axes.retain(|known| known.key != axis.key);
-            axes.push(axis);
-        }
+        let given_axes = wanted.vary.iter().map(|text| SweepAxis::parse(text)).collect::<Result<Vec<_>, _>>();
+        let given_axes = given_axes.map_err(usage)?;
+        // The command line overrides the file. A key that it varies twice is an error.
+        axes.retain(|of_file| given_axes.iter().all(|axis| axis.key != of_file.key));
+        axes.extend(given_axes);
         let how = match wanted.sample.map(|count| count as usize).or(file.sample.filter(|_| !wanted.zip)) {
             Some(count) => Combination::Sample { count, seed: wanted.seed.or(file.seed).unwrap_or(1) },
             None if wanted.zip || file.zip => Combination::Zip,
@@ -99,9 +108,11 @@ impl Plan {
     }
 
     /// The points (from 0) that are still to be run.
-    pub fn open(&self, redo: bool) -> Vec<usize> {
+    pub fn open(&self, wanted: Again) -> Vec<usize> {
         let known = self.sweep.gathered(&self.store);
-        let again = |result: &PointResult| result.status == PointResult::KILLED || (redo && !result.finished());
+        let again = |result: &PointResult| {
+            if result.status == PointResult::KILLED { wanted.killed } else { wanted.failed && !result.finished() }
+        };
         let is_open = |k: &usize| known[*k].as_ref().is_none_or(again);
         let open: Vec<usize> = (0..known.len()).filter(is_open).collect();
         if open.len() < known.len() {

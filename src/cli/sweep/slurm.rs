@@ -326,5 +326,11 @@ mod tests {
     #[test]
     fn words_stay_what_they_are_in_a_shell() {
         assert_eq!(quoted("it's"), r"'it'\''s'");
+        for word in ["it's", "a b", "\"a\" `id` $(id) $HOME", "two\nlines\n#SBATCH --wrap=id", "\\", "", "*", "--only"]
+        {
+            let line = format!("printf '%s.' {} {}", quoted(word), quoted("next"));
+            let Ok(shell) = Command::new("sh").args(["-c", &line]).output() else { return };
+            assert_eq!(String::from_utf8_lossy(&shell.stdout), format!("{word}.next."), "{word:?}");
+        }
     }
 }

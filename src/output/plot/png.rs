@@ -1,5 +1,6 @@
 //! Plots in pixels.
 
+use super::super::ownership::marked_png;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 use std::sync::Arc;
@@ -16,5 +17,5 @@ pub fn draw(svg: &str) -> Result<Vec<u8>, String> {
     let size = tree.size().to_int_size().scale_by(PIXELS).ok_or("it has no size")?;
     let mut pixels = Pixmap::new(size.width(), size.height()).ok_or("it is too large")?;
     resvg::render(&tree, Transform::from_scale(PIXELS, PIXELS), &mut pixels.as_mut());
-    pixels.encode_png().map_err(|error| error.to_string())
+    pixels.encode_png().map(marked_png).map_err(|error| error.to_string())
 }

@@ -1,6 +1,7 @@
 //! The text of an SVG file. Light colours are attributes of the elements, which every program shows.
 //! Dark colours are in a style sheet for programs that know the reader's mode.
 
+use super::super::ownership::GENERATOR;
 use std::fmt::Write;
 
 /// The colours of a picture.
@@ -106,6 +107,7 @@ impl Svg {
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
              font-family=\"'Noto Sans', 'Segoe UI', Helvetica, Arial, 'Liberation Sans', sans-serif\" role=\"img\">\n"
         );
+        let _ = writeln!(out, "<!-- {GENERATOR} -->");
         let _ = writeln!(out, "<title>{}</title>", escaped(title));
         if theme == Theme::OfReader {
             out.push_str("<style>@media (prefers-color-scheme: dark) {\n");

@@ -229,6 +229,9 @@ fn peaks_of_long_histories_stay() {
 #[test]
 fn png_files_hold_the_picture() {
     let png = plot(vec![line("tip.ux", vec![(0.0, 0.0), (1.0, 2.0)])], Scale::Linear).to_png().unwrap();
+    // The mark stands between the header and the pixels.
+    let begins = |at: usize, text: &[u8]| png[at..].starts_with(text);
+    assert!(begins(37, b"tEXtSoftware\0beamsim ") && begins(12, b"IHDR"));
     let number = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
     assert_eq!((&png[..8], &png[12..16]), (&b"\x89PNG\r\n\x1a\n"[..], &b"IHDR"[..]));
     assert_eq!((number(16), number(20)), (1720, 960));

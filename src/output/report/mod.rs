@@ -6,6 +6,7 @@ mod film;
 
 pub use film::{Film, Reel};
 
+use super::ownership::GENERATOR;
 use super::{HistoryReader, OutputError, PartFile, Record, Units};
 use beamsim_core::probe::{COLUMNS, ColumnGroup, ColumnPart};
 use encode::base64;
@@ -60,7 +61,12 @@ impl Report<'_> {
         let escaped = self.title.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
         let (before, after) = PAGE.split_once("{{DATA}}").unwrap_or((PAGE, ""));
         // A page of text must not take what a deck says for its own; `<` stands in texts alone.
-        Ok([&before.replace("{{TITLE}}", &escaped), &data.to_string().replace('<', "\\u003c"), after].concat())
+        Ok([
+            &before.replace("{{GENERATOR}}", GENERATOR).replace("{{TITLE}}", &escaped),
+            &data.to_string().replace('<', "\\u003c"),
+            after,
+        ]
+        .concat())
     }
 }
 

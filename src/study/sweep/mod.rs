@@ -2,12 +2,14 @@
 //! all.
 
 mod axes;
+mod in_flight;
 mod latin;
 mod point;
 mod store;
 mod table;
 
 pub use axes::{Combination, Range, SweepAxis, Values};
+pub use in_flight::{InFlight, LeftBehind};
 pub use point::PointResult;
 pub use store::Store;
 
@@ -42,6 +44,8 @@ pub struct SweepOptions<'a> {
     pub threads: usize,
     /// The signal that was caught, if there was one
     pub interrupted: &'a (dyn Fn() -> Option<i32> + Sync),
+    /// The list of the points that have begun, for the case that the process dies
+    pub in_flight: Option<&'a InFlight>,
     /// Takes each point (from 0) as it ends
     pub ended: &'a mut dyn FnMut(usize, &PointResult),
 }
@@ -70,7 +74,11 @@ impl Sweep {
     }
 
     fn check_keys(&self, deck: &Deck) -> Result<(), SweepError> {
-        deck::apply(&self.text, &self.settings(0)).map_err(SweepError::Setting)?;
+        let changed = deck::apply(&self.text, &self.settings(0)).map_err(SweepError::Setting)?;
+        // The values of a point are its own matter: only its keys must exist.
+        if let Some(error) = unknown_key(&changed) {
+            return Err(SweepError::Setting(error));
+        }
         if let Some(counter) = self.outputs.iter().find(|output| output.column.starts_with("run.")) {
             return Err(SweepError::CounterAsOutput(counter.column.clone()));
         }
@@ -105,10 +113,13 @@ impl Sweep {
 
     /// Runs points (from 0) in parallel, and saves the result of each as it ends.
     pub fn run(&self, points: &[usize], store: &Store, options: SweepOptions) -> Result<(), OutputError> {
-        let SweepOptions { threads, interrupted, ended } = options;
+        let SweepOptions { threads, interrupted, in_flight, ended } = options;
         // The queue is emptied from its end.
         let open = points.iter().rev().copied().collect();
         let work = |k: usize| {
+            if let Some(Err(error)) = in_flight.map(|list| list.note(&self.identity(k))) {
+                return Some(PointResult::failed(FailureKind::Io.name(), error.to_string()));
+            }
             let done = point::run(&self.text, &self.settings(k), self.error_bars, &interrupted);
             (done.status != FailureKind::Interrupted.name()).then_some(done)
         };
@@ -130,6 +141,16 @@ impl Sweep {
     pub fn gathered(&self, store: &Store) -> Vec<Option<PointResult>> {
         (0..self.points.len()).map(|k| store.find(&self.identity(k))).collect()
     }
+}
+
+/// The error about a key that a deck cannot have, if there is one.
+fn unknown_key(text: &str) -> Option<String> {
+    let found = deck::read(text).map_or_else(|found| found, |(_, found)| found);
+    let error = found.into_iter().find(|error| error.is_of_key)?;
+    Some(match error.help {
+        Some(help) => format!("{}: {help}", error.message),
+        None => error.message,
+    })
 }
 
 /// The initial value of the hash FNV-1a.

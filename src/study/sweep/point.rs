@@ -52,7 +52,7 @@ pub fn run(text: &str, settings: &[String], error_bars: bool, interrupted: &dyn 
     };
     match BuiltDeck::read(&text) {
         Ok(built) => simulate(&text, built, error_bars, interrupted),
-        Err(error) => PointResult::failed("deck", error.to_string()),
+        Err(error) => PointResult::failed(error.kind().name(), error.to_string()),
     }
 }
 

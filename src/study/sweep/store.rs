@@ -32,6 +32,11 @@ impl Store {
         Self { folder: folder.join("points") }
     }
 
+    /// The folder of the points.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// The path of a point. It depends on the identity and not on the number, so that a larger
     /// sweep finds the results of a smaller one.
     fn place(&self, identity: &str) -> Place {

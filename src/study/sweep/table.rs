@@ -1,6 +1,7 @@
 //! sweep.csv: a row for each point.
 
 use super::{PointResult, Sweep};
+use crate::output::harmless;
 
 /// The status of a point without a result.
 const MISSING: &str = "missing";
@@ -10,9 +11,10 @@ impl Sweep {
     /// same bytes.
     pub fn to_csv(&self, results: &[Option<PointResult>]) -> Result<Vec<u8>, csv::Error> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(self.header())?;
+        let mut write = |cells: Vec<String>| writer.write_record(cells.iter().map(|cell| harmless(cell).into_owned()));
+        write(self.header())?;
         for (k, result) in results.iter().enumerate() {
-            writer.write_record(self.row(k, result.as_ref()))?;
+            write(self.row(k, result.as_ref()))?;
         }
         writer.into_inner().map_err(|error| error.into_error().into())
     }

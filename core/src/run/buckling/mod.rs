@@ -108,7 +108,7 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         let load = self.stage.state.load;
         let loads = critical_loads(self.stage, self.modes)?;
         if loads.is_empty() {
-            return Err(Failure::Deck(NOTHING_BUCKLES.into()));
+            return Err(Failure::Deck(format!("stage {}: {NOTHING_BUCKLES}", self.stage.number + 1)));
         }
         let start = self.stage.state.clone();
         // Next to a critical load round-off moves the scene along; the load itself is closed in by

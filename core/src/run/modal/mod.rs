@@ -42,6 +42,10 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
         let matrices = self.matrices()?;
         let found = self.find(&matrices)?;
         let mut listed = listed(&found, self.modes);
+        if listed.is_empty() && self.modes > 0 {
+            // The masses are too small for their squares to be numbers.
+            return Err(self.stage.describe(StageError::NoMass));
+        }
         for motion in &mut listed {
             self.stage.unless_interrupted()?;
             self.refine(motion);
