@@ -55,3 +55,8 @@ mutations *NAMES:
 # Run everything that must pass before a change is merged
 ci:
     .ci/run
+
+# Kill runs at random, run pairs into one folder, fill disks, send signals (docs/reliability.md)
+reliability KILLS='500' PAIRS='200':
+    python3 tests/reliability/kills.py --beamsim {{beamsim}} --kills {{KILLS}} --pairs {{PAIRS}}
+    python3 tests/reliability/signals.py {{beamsim}}

@@ -53,6 +53,10 @@ impl ResultFolder {
     /// or where something is in the way of the results. With `force` plain files of others are not.
     pub fn claim(path: &Path, force: bool) -> Result<Self, OutputError> {
         let is_new = !path.exists();
+        if !is_new && !path.is_dir() {
+            let reason = "is no folder: results are written into a folder".into();
+            return Err(OutputError::Occupied { path: path.into(), reason });
+        }
         fs::create_dir_all(path).map_err(|error| OutputError::file(path, error))?;
         let folder = Self { path: path.into(), is_new, lock: lock(path)? };
         folder.refuse_obstacles(force)?;

@@ -63,7 +63,7 @@ fn a_hinge_in_statics_is_a_mechanism() {
 fn a_history_without_a_value_is_not_finite() {
     let failure = failure(
         "[[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 0, 1]\nhistory = \"h\"\n\
-         [history.h]\nexpr = \"1/t\"\n[[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.1\n",
+         [history.h]\nexpr = \"1/(t - 0.5)\"\n[[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.1\n",
     );
     assert!(matches!(&failure, Failure::NonFinite { node, .. } if node == "tip"), "{failure}");
 }

@@ -168,6 +168,7 @@ impl<'o> Run<'o> {
             fresh,
             soft: false,
             prescribed_increment: Vec::new(),
+            unflattened: Vec::new(),
             resumed: None,
             is_judged: false,
         })

@@ -82,6 +82,9 @@ pub(super) struct StageRun<'r> {
     pub prescribed_increment: Vec<Vec3>,
     /// Attempts that earlier stages have taken back
     pub cutbacks_before: u64,
+    /// The unknowns of the last balance before it was flattened, which its stiffness belongs to; in
+    /// static stages in tilted planes
+    pub unflattened: Vec<Vec3>,
     /// Where a checkpoint has left the stage; taken by its analysis
     pub resumed: Option<AnalysisCheckpoint>,
     /// The analysis is at its end, and judged.
@@ -172,16 +175,19 @@ impl StageRun<'_> {
     /// Continues from the last good state what goes on without jumps: turns of nodes and of joints.
     fn continue_to_state(&mut self) -> Result<(), Failure> {
         self.refuse_infinities()?;
+        self.flatten();
         self.wind()?;
         self.model.remember(self.state);
         Ok(())
     }
 
-    /// Takes out of the state what round-off has put aside of the plane.
-    pub fn flatten(&mut self) {
-        if let Some(plane) = &self.plane {
-            self.model.flatten(plane, self.state);
+    /// Takes out of the state what round-off has put aside of a tilted plane.
+    fn flatten(&mut self) {
+        let Some(plane) = self.plane.as_ref().filter(|plane| plane.is_tilted()) else { return };
+        if self.stage().work.kind().ramps_load() {
+            threads::copy(&mut self.unflattened, &self.state.q);
         }
+        self.model.flatten(plane, self.state);
     }
 
     /// Passes a state on the way to a balance: it becomes the good one, turns are counted, and the
@@ -189,7 +195,6 @@ impl StageRun<'_> {
     pub fn pass_through(&mut self, assembly: &Assembly) -> Result<(), Failure> {
         self.unless_interrupted()?;
         self.state.anchor = None;
-        self.flatten();
         self.continue_to_state()?;
         if self.plan.energy {
             self.bookkeeper.add_step(Entry::new(self.model, self.state, assembly));

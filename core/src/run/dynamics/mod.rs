@@ -218,7 +218,6 @@ impl Dynamics<'_, '_> {
 
     /// Settles a step that is taken, written or not.
     fn settle(&mut self, step: &Step) -> Result<(), Failure> {
-        self.stage.flatten();
         self.stage.accept()?;
         self.settle_charts(step);
         Ok(())
@@ -373,7 +372,6 @@ impl Dynamics<'_, '_> {
 
     /// Completes a step that is taken: account, row, charts. True if the stage is over.
     fn complete(&mut self, step: &Step) -> Result<bool, Failure> {
-        self.stage.flatten();
         self.stage.accept()?;
         self.stage.counters.steps += 1;
         self.stage.show()?;

@@ -237,7 +237,6 @@ impl Follower<'_, '_> {
     fn arrive(&mut self, point: PathPoint, target: Option<PathTarget>) -> Result<(), Failure> {
         self.stage.good.copy_from(&self.path.here.state);
         self.stage.state.copy_from(&point.state);
-        self.stage.flatten();
         self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
         self.stage.accept()?;
         self.stage.counters.steps += 1;

@@ -3,6 +3,7 @@
 use super::levels::Levels;
 use super::path_point::{Path, PathPoint};
 use crate::solve::Signature;
+use crate::tensor::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// A stage of load levels between two rows.
@@ -15,6 +16,8 @@ pub(in crate::run) struct LevelsCheckpoint {
     pub follows_signs: bool,
     /// The stiffness of the last level is the first tangent of the next.
     pub is_given: bool,
+    /// The unknowns that this stiffness belongs to, if they are not those of the state
+    pub unflattened: Vec<Vec3>,
     /// The signs of pivots at the last level
     pub signature: Option<Signature>,
     /// The signs of pivots before the first level

@@ -81,10 +81,11 @@ impl LoadLevels<'_, '_> {
 
     /// Goes on from where a checkpoint has left the stage.
     fn take_up(&mut self, checkpoint: LevelsCheckpoint) -> Result<(), Failure> {
-        let LevelsCheckpoint { reached, levels, follows_signs, is_given, signature, at_start } = checkpoint;
+        let LevelsCheckpoint { reached, levels, follows_signs, is_given, unflattened, signature, at_start } =
+            checkpoint;
         let stability = Stability::again(follows_signs, signature);
         if is_given {
-            self.stage.make_again(Stability::follow_again);
+            self.stage.make_again(|stage| Stability::follow_again(stage, unflattened));
         }
         let space = SpatialLook::default();
         LevelControl { stage: self.stage, space, levels, stability, at_start, loose: None }.go(reached, self.steps)
@@ -130,12 +131,14 @@ impl LevelControl<'_, '_> {
         }
         let Self { stage, levels, stability, at_start, .. } = self;
         let is_given = stage.newton.is_given(&stage.assembly.system);
+        let unflattened = stage.unflattened.clone();
         stage.offer_checkpoint(|| {
             AnalysisCheckpoint::Levels(LevelsCheckpoint {
                 reached,
                 levels: levels.clone(),
                 follows_signs: stability.counts(),
                 is_given,
+                unflattened,
                 signature: stability.signature,
                 at_start: *at_start,
             })

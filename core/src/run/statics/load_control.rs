@@ -36,8 +36,6 @@ impl StageRun<'_> {
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
         let moved = moves.then_some(&prescribed_increment[..]);
         newton.solve(model, assembly, state, &Equilibrium, moved, &mut counters.work)?;
-        // The stiffness that is looked at next is that of the state that goes on.
-        self.flatten();
         self.refuse_leaps()?;
         self.refuse_windings()
     }

@@ -9,6 +9,7 @@ use crate::run::results::{Event, EventKind, Mode};
 use crate::run::spatial::SpatialLook;
 use crate::run::stage_run::StageRun;
 use crate::solve::{Signature, Tangent};
+use crate::tensor::Vec3;
 use crate::warning::WarningKind;
 
 /// Limit and branch points of a run that are told one by one.
@@ -64,10 +65,15 @@ impl Stability {
     }
 
     /// Forms and factorises the tangent of the run's state again, as [`Stability::look`] has left
-    /// it for the next solution.
-    pub fn follow_again(stage: &mut StageRun) {
+    /// it for the next solution: that of the `unflattened` unknowns, if there are any.
+    pub fn follow_again(stage: &mut StageRun, unflattened: Vec<Vec3>) {
         let StageRun { assembly, newton, state, counters, .. } = stage;
+        let flat = state.q.clone();
+        if !unflattened.is_empty() {
+            state.q = unflattened;
+        }
         newton.signature_at(assembly, state, &mut counters.work);
+        state.q = flat;
         newton.begin_with(&assembly.system);
     }
 
