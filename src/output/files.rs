@@ -11,6 +11,9 @@ pub const FIELDS: &str = "fields";
 /// The folder of the fields of a run that did not.
 pub const PARTIAL_FIELDS: &str = "fields.partial";
 
+/// Digits of the number of an incomplete file.
+const DIGITS: usize = 16;
+
 /// An incomplete file: `name.<number>.part` beside its final place, with a random number.
 #[derive(Debug)]
 pub struct PartFile {
@@ -25,9 +28,15 @@ impl PartFile {
         loop {
             // Process numbers are those of a container: two of them may write into one folder.
             let number = RandomState::new().hash_one(name);
-            let part = folder.join(format!("{name}.{number:016x}.part"));
+            let part = folder.join(format!("{name}.{number:0DIGITS$x}.part"));
             // What exists is neither opened nor followed.
             match File::create_new(&part) {
+                // The lock tells others that the file is not left by a dead process.
+                Ok(file) if file.try_lock().is_ok() && is_at(&file, &part) => {
+                    return Ok((Self { folder: folder.into(), part }, file));
+                }
+                Ok(_) if !part.exists() => {}
+                // The file system has no locks.
                 Ok(file) => return Ok((Self { folder: folder.into(), part }, file)),
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(OutputError::file(&part, error)),
@@ -69,6 +78,42 @@ impl PartFile {
     pub fn rename(self, name: &str) -> Result<(), OutputError> {
         let done = self.folder.join(name);
         fs::rename(&self.part, &done).map_err(|error| OutputError::file(&done, error))
+    }
+}
+
+/// True if a path still leads to an open file.
+#[cfg(unix)]
+pub fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let place = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
+    match (file.metadata(), fs::symlink_metadata(path)) {
+        (Ok(own), Ok(there)) => place(own) == place(there),
+        (Err(_), _) | (_, Err(_)) => false,
+    }
+}
+
+/// True if a path still leads to an open file: elsewhere open files cannot be removed.
+#[cfg(not(unix))]
+pub fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+/// Removes the incomplete files that dead processes have left in a folder: those that nobody has
+/// locked. What cannot be removed harms nobody.
+pub fn remove_dead_parts(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let number = name.strip_suffix(".part").and_then(|name| name.rsplit('.').next());
+        let is_numbered = number.is_some_and(|n| n.len() == DIGITS && n.bytes().all(|c| c.is_ascii_hexdigit()));
+        if !is_numbered || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            continue;
+        }
+        if let Ok(file) = File::options().write(true).open(entry.path()) {
+            if file.try_lock().is_ok() {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
     }
 }
 

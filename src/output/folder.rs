@@ -6,7 +6,7 @@
 //! the others get theirs: a crash between two of these leaves files missing, never files of two
 //! runs side by side, and the next command that opens the folder completes what was begun.
 
-use super::files::{FIELDS, PARTIAL_FIELDS};
+use super::files::{FIELDS, PARTIAL_FIELDS, is_at, remove_dead_parts};
 use super::record::{FileRecord, Record};
 use super::{OutputError, OutputKind, may_replace, remove_fields, remove_if_there};
 use std::fs::{self, File, TryLockError};
@@ -71,6 +71,7 @@ impl ResultFolder {
 
     /// Removes what runs that were killed have left unfinished.
     pub fn clean(&self) -> Result<(), OutputError> {
+        remove_dead_parts(&self.path);
         for name in tables().chain([RECORD, CHECKPOINT]).chain(INDICES) {
             remove_if_there(&self.path, &part(name))?;
         }
@@ -226,23 +227,6 @@ fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
             Err(TryLockError::Error(error)) => return Err(OutputError::file(&path, error)),
         }
     }
-}
-
-/// True if a path still leads to an open file.
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let place = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
-    match (file.metadata(), fs::symlink_metadata(path)) {
-        (Ok(own), Ok(there)) => place(own) == place(there),
-        (Err(_), _) | (_, Err(_)) => false,
-    }
-}
-
-/// True if a path still leads to an open file: elsewhere open files cannot be removed.
-#[cfg(not(unix))]
-fn is_at(_: &File, _: &Path) -> bool {
-    true
 }
 
 /// Refuses to replace what is not a plain file.

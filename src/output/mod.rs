@@ -20,7 +20,7 @@ pub use cells::harmless;
 pub use checkpoint::{Found, SavedRun};
 pub use error::OutputError;
 pub use fields::{FieldsPlace, FieldsWriter};
-pub use files::{PartFile, remove_fields, remove_if_there};
+pub use files::{PartFile, remove_dead_parts, remove_fields, remove_if_there};
 pub use folder::{ResultFolder, settle};
 pub use history::{
     BarsPlace, CompanionPlace, HistoryPlace, HistoryReader, HistoryWriter, Row, RowCounter, Rows, SideColumns,

@@ -184,8 +184,9 @@ class Study:
             for file in same:
                 if read(f"study/{file}") != read(f"study_whole/{file}"):
                     self.fault(f"{name}: {file} differs after kills")
-            left = [file for file in os.listdir("study") if file.endswith(".part")]
-            self.count("parts left by studies", len(left))
+            left = [file for _, _, files in os.walk("study") for file in files if file.endswith(".part")]
+            if left:
+                self.fault(f"{name}: {left} are left")
         self.count(f"kills of {name}", done)
         shutil.rmtree("study_whole")
 
@@ -221,11 +222,12 @@ class Study:
             self.count("pairs refused one", len(refused) == 1)
         self.count("pairs in PID namespaces" if namespaces else "pairs", count)
 
-    def full_disks(self, sizes):
-        """A limit on the size of files in the place of a full disk."""
+    def full_disks(self):
+        """A limit on the size of files in the place of a full disk; the smallest have no room for run.json."""
         self.whole(["run", "swing.toml", "-q", "--out", "roomy"])
         whole = read("roomy/history.csv")
-        for size in sizes:
+        parts = [len(whole) * k // 10 for k in (5, 6, 7, 8, 9)]
+        for size in [0, 100, 4096, 60_000, 70_000, *parts]:
 
             def limit(size=size):
                 resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
@@ -239,7 +241,7 @@ class Study:
                 self.fault(f"disk full at {size}: status {done.returncode}: {done.stderr[-200:]}")
             elif read("tight/history.csv"):
                 self.fault(f"disk full at {size}: a part has a final name")
-            elif kept is None and size > 20_000:
+            elif kept is None and size > 65_536:
                 self.fault(f"disk full at {size}: what was reached is not kept: {os.listdir('tight')}")
             elif kept is not None and not (whole.startswith(kept) and kept.endswith(b"\n")):
                 self.fault(f"disk full at {size}: what is kept is not the beginning of the history")
@@ -277,7 +279,7 @@ def main():
         study.kills_of_studies("accuracy", accuracy, wanted.kills // 16, ["history.csv"])
         study.pairs(wanted.pairs, False)
         study.pairs(max(1, wanted.pairs * 3 // 20), True)
-        study.full_disks([0, 100, 4096, 30_000, 60_000, 100_000, 130_000, 160_000, 190_000, 220_000])
+        study.full_disks()
         os.chdir("/")
     print(f"{len(study.faults)} faults;", ", ".join(f"{what}: {count}" for what, count in sorted(study.counts.items())))
     sys.exit(1 if study.faults else 0)

@@ -121,6 +121,7 @@ fn one(wanted: &SweepArguments) -> Result<(), CommandError> {
         return failures(failed, points.len());
     }
     outputs::check_folder(&plan.folder, &[("sweep.csv", OutputKind::Sweep)])?;
+    plan.store.clean();
     if !part.gather {
         // A job array is told from outside what it may take, and may succeed with more.
         let again = Again { failed: part.redo, killed: part.redo || part.retry || wanted.engine == Engine::Slurm };

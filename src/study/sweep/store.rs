@@ -2,7 +2,7 @@
 //! and a killed one leaves no half result.
 
 use super::point::PointResult;
-use crate::output::{OutputError, PartFile, remove_if_there};
+use crate::output::{OutputError, PartFile, remove_dead_parts, remove_if_there};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -37,6 +37,12 @@ impl Store {
         &self.folder
     }
 
+    /// Removes what processes that died have left half-written.
+    pub fn clean(&self) {
+        let folders = fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        folders.for_each(|folder| remove_dead_parts(&folder.path()));
+    }
+
     /// The path of a point. It depends on the identity and not on the number, so that a larger
     /// sweep finds the results of a smaller one.
     fn place(&self, identity: &str) -> Place {
@@ -50,7 +56,7 @@ impl Store {
         let stored = StoredPoint { identity: identity.into(), result: result.clone() };
         let path = folder.join(&name);
         let content = serde_json::to_vec(&stored).map_err(|error| OutputError::content(&path, error))?;
-        let (part, _) = PartFile::written(&folder, &name, &content)?;
+        let (part, _file) = PartFile::written(&folder, &name, &content)?;
         part.rename(&name)
     }
 
