@@ -153,24 +153,29 @@ fn a_folder_has_one_run_at_a_time() {
 fn what_is_in_the_way_of_results_is_told_before_the_run() {
     let folder = Folder::new("in_the_way");
     folder.write("swing.toml", SWING);
-    let refuse = |out: &str| {
+    let refuse = |out: &str, why: &str| {
         let output = folder.beamsim(&["run", "swing.toml", "-q", "--out", out]);
         assert_eq!(status(&output), 4, "{out}");
-        assert!(last_line(&output).contains("is in the way of the results"), "{}", last_line(&output));
+        assert!(last_line(&output).contains(why), "{}", last_line(&output));
     };
-    for (out, name) in [("a", "modes.csv"), ("b", "run.json"), ("c", "history.csv.part")] {
+    let cases = [
+        ("a", "modes.csv", "is a folder"),
+        ("b", "run.json", "is a folder"),
+        ("c", "history.csv.part", "is in the way of the results"),
+    ];
+    for (out, name, why) in cases {
         fs::create_dir_all(folder.0.join(out).join(name)).unwrap();
-        refuse(out);
+        refuse(out, why);
         assert_eq!(folder.names(out), [name]);
     }
     fs::create_dir_all(folder.0.join("d/fields")).unwrap();
     folder.write("d/fields/mine.vtu", "");
-    refuse("d");
+    refuse("d", "is in the way of the results");
     #[cfg(unix)]
     {
         fs::create_dir(folder.0.join("e")).unwrap();
         std::os::unix::fs::symlink("../swing.toml", folder.0.join("e/history.csv")).unwrap();
-        refuse("e");
+        refuse("e", "is a link");
     }
     assert_eq!(fs::read_to_string(folder.0.join("swing.toml")).unwrap(), SWING);
 }

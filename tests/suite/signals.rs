@@ -42,14 +42,14 @@ at = "root"
 fix = "all"
 [[load]]
 at = "tip"
-force = [-1, 3, 40]
+force = [-1, 0.3, 0.4]
 "#;
 
 const STATIC: &str = "[[stage]]\nkind = \"static\"\nsteps = 2000\n";
 const PATH: &str = "[[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = 5000\n";
-const MODAL: &str = "[[stage]]\nkind = \"static\"\n[[stage]]\nkind = \"modal\"\nmodes = 300\n";
+const MODAL: &str = "[[stage]]\nkind = \"static\"\nsteps = 1\n[[stage]]\nkind = \"modal\"\nmodes = 300\n";
 const BUCKLING: &str = "[[stage]]\nkind = \"buckling\"\nmodes = 6\n";
-const DYNAMIC: &str = "[[stage]]\nkind = \"dynamic\"\nend = 1e5\nstep = 0.01\n";
+const DYNAMIC: &str = "[[stage]]\nkind = \"dynamic\"\nend = 1e5\nstep = 0.01\nscheme = \"generalized_alpha\"\n";
 
 /// A process that is killed with the test.
 struct Running(Child);
@@ -168,14 +168,14 @@ fn a_signal_that_comes_twice_at_once_is_one() {
     let run = [env!("CARGO_BIN_EXE_beamsim"), "run", "long.toml"];
     let mut running = Running::by(Command::new("timeout").arg("1").args(run), &folder.0);
     running.end();
-    assert_eq!(folder.names("results/long"), ["history.partial.csv", "run.json"]);
+    assert_eq!(folder.names("results/long"), ["checkpoint", "history.partial.csv", "run.json"]);
 }
 
 /// Messages that nobody reads stop the process in its work: it cannot answer.
 #[test]
 fn a_second_signal_ends_a_process_that_hangs() {
     let folder = Folder::new("second_signal");
-    folder.write("arm.toml", &(ARM.replace("ELEMENTS", "1") + "[[stage]]\nkind = \"static\"\n"));
+    folder.write("arm.toml", &(ARM.replace("ELEMENTS", "1") + "[[stage]]\nkind = \"static\"\nsteps = 1\n"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_beamsim"));
     command.args(["sweep", "arm.toml", "--vary", "section.rod.EA=-1:-2:4000", "--threads", "1"]);
     command.current_dir(&folder.0).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
@@ -199,8 +199,8 @@ fn other_commands_answer_signals() {
         &["verify", "motion.toml", "--out", "v"],
         &["effects", "motion.toml"],
         &["cost", "motion.toml", "--out", "c"],
-        &["run", "motion.toml", "--accuracy", "1e-6"],
-        &["run", "motion.toml", "--error-bars"],
+        &["run", "motion.toml", "--fresh", "--accuracy", "1e-6", "--set", "stage.0.end=200"],
+        &["run", "motion.toml", "--fresh", "--error-bars"],
         &["sweep", "motion.toml", "--vary", "beam.0.elements=50,60,70,80", "--out", "s"],
     ] {
         for (delay, signal) in delays(3, 1.5).zip([INT, TERM, HUP]) {
@@ -222,7 +222,7 @@ fn a_pipe_without_a_writer_does_not_keep_a_command() {
 fn a_folder_of_decks_may_hold_pipes_and_links_to_itself() {
     let folder = Folder::new("odd_folder");
     fs::create_dir_all(folder.0.join("decks/inner")).unwrap();
-    folder.write("decks/arm.toml", &(ARM.replace("ELEMENTS", "1") + "[[stage]]\nkind = \"static\"\n"));
+    folder.write("decks/arm.toml", &(ARM.replace("ELEMENTS", "1") + "[[stage]]\nkind = \"static\"\nsteps = 1\n"));
     Command::new("mkfifo").arg(folder.0.join("decks/pipe.toml")).status().unwrap();
     std::os::unix::fs::symlink("../..", folder.0.join("decks/inner/up")).unwrap();
     std::os::unix::fs::symlink("..", folder.0.join("decks/inner/loop")).unwrap();
@@ -236,7 +236,7 @@ fn a_folder_of_decks_may_hold_pipes_and_links_to_itself() {
 #[test]
 fn a_slurm_that_hangs_is_stopped() {
     let folder = Folder::new("slurm_hangs");
-    folder.write("arm.toml", &(ARM.replace("ELEMENTS", "1") + "[[stage]]\nkind = \"static\"\n"));
+    folder.write("arm.toml", &(ARM.replace("ELEMENTS", "1") + "[[stage]]\nkind = \"static\"\nsteps = 1\n"));
     let tools = folder.0.join("tools");
     fs::create_dir_all(&tools).unwrap();
     for hangs in ["squeue", "scontrol", "sbatch"] {
