@@ -102,8 +102,16 @@ impl RunArguments {
     /// Additions to the results of a run that goes to a target: accuracy, error bars, film.
     pub fn extras(&self, path: &Path, chosen: Chosen, target: &mut Target) -> Result<(Scene, RunExtras), CommandError> {
         let Chosen { loaded, accuracy, outcome, .. } = chosen;
+        let is_resumed = target.saved.is_some();
         let saved = target.saved.as_mut();
         let (bars_so_far, reel) = saved.map_or((None, None), |saved| (saved.bars.take(), saved.reel.take()));
+        let missing =
+            [("--error-bars", self.error_bars && bars_so_far.is_none()), ("--report", self.report && reel.is_none())];
+        if let Some((option, _)) = missing.into_iter().find(|&(_, is_missing)| is_resumed && is_missing) {
+            let why =
+                format!("the run was begun without {option}: resume it without that, or use --fresh to begin anew");
+            return Err(CommandError::Checkpoint(why));
+        }
         let bars = match bars_so_far {
             Some(place) => Some(ErrorBars::resume(&loaded.deck, &loaded.scene, place)),
             None if self.error_bars => Some(bars(path, &loaded)?),

@@ -5,7 +5,6 @@ use super::error::CommandError;
 use super::simulate::Target;
 use crate::output::{Found, ResultFolder};
 use crate::scene::Scene;
-use beamsim_core::run::Checkpoint;
 use std::time::Duration;
 
 /// The time between checkpoints.
@@ -36,7 +35,7 @@ impl RestartArguments {
         }
         let place = folder.path().display().to_string();
         let refuse = |why: String| Err(CommandError::Checkpoint(why));
-        match Found::<Checkpoint>::read(scene, folder.path())? {
+        match Found::read(scene, folder.path())? {
             Found::Nothing => {
                 if self.resume {
                     console::note(&format!("{name}: {place} has no checkpoint: the run begins at its start"));

@@ -59,6 +59,8 @@ fn run_one(
         let written = report::write(&scene, name, &record, film, folder, &page);
         written.unwrap_or_else(|error| verdict.fail(error));
     }
+    // From here on another run may write to the folder.
+    drop(finished.folder.take());
     finished.result.map_err(CommandError::Run)?;
     missed.map_or(Ok(()), |missed| Err(CommandError::Missed(missed)))
 }

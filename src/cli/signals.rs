@@ -73,9 +73,11 @@ pub fn listen() {
     let _ = thread::Builder::new().name("signals".into()).stack_size(STACK_BYTES).spawn(hear_all);
 }
 
-/// The signals that are heard. A hang-up that `nohup` has switched off stays so.
+/// The signals that are heard. Those that are switched off stay so: a hang-up by `nohup`, an
+/// interrupt by a shell that runs the command in the background.
 fn heard() -> Vec<i32> {
-    let mut signals = vec![SIGINT, SIGTERM];
+    let mut signals: Vec<i32> =
+        [SIGINT, SIGTERM].into_iter().filter(|&signal| is_ignored(signal) != Some(true)).collect();
     if is_ignored(SIGHUP) == Some(false) {
         signals.push(SIGHUP);
     }

@@ -45,6 +45,8 @@ pub struct Finished {
     pub record: Option<Record>,
     /// The number of threads
     pub threads: usize,
+    /// The folder of results, which no other run writes to as long as this value lives
+    pub folder: Option<ResultFolder>,
 }
 
 /// Bytes that are taken for run.json when a run begins. Longer ones, of decks with long tables, may
@@ -115,6 +117,7 @@ pub fn simulate(
     watcher.progress.done();
     let seconds = seconds_of_search.unwrap_or_else(|| start.elapsed().as_secs_f64());
     let mut record = None;
+    let mut folder = None;
     if let Some(mut results) = watcher.results.take() {
         let completed = results.complete(result.is_ok());
         if let (Ok(()), Err(error)) = (&result, completed) {
@@ -123,13 +126,14 @@ pub fn simulate(
         let resumed = results.resumed;
         let run = FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, source, resumed };
         let mut content = Record::of(scene, run);
-        let written = results.commit(&result, &mut content);
+        let (claimed, written) = results.commit(result.is_ok(), &mut content);
+        folder = Some(claimed);
         record = Some(content);
         if let Err(error) = written {
             result = Err(Failure::Io(error.to_string()));
         }
     }
-    Finished { result, counters, seconds, film: watcher.film, record, threads }
+    Finished { result, counters, seconds, film: watcher.film, record, threads, folder }
 }
 
 /// The files that are written while a run goes on.
@@ -145,8 +149,8 @@ struct Results {
     interval: Option<Duration>,
     /// When the last checkpoint was written, or the run began
     kept: Instant,
-    /// There are rows behind the last checkpoint.
-    has_new_rows: bool,
+    /// There are rows or results behind the last checkpoint.
+    has_news: bool,
     /// The names of the files that are complete
     names: Vec<&'static str>,
 }
@@ -164,42 +168,27 @@ impl Results {
             folder.reserve(RESERVED)?;
             let history = HistoryWriter::create(&folder, names, bars)?;
             let fields = scene.vtk.then(|| FieldsWriter::create(&folder, scene.figure(), timed)).transpose()?;
-            let (modes, rows) = (ModesWriter::default(), RowCounter::new(rows));
-            let kept = Instant::now();
-            let results = Self {
-                folder,
-                history,
-                fields,
-                modes,
-                rows,
-                resumed: 0,
-                interval,
-                kept,
-                has_new_rows: false,
-                names: Vec::new(),
-            };
-            return Ok((results, None));
+            let files = (history, fields, ModesWriter::default());
+            return Ok((Self::with(folder, files, RowCounter::new(rows), interval, 0), None));
         };
-        let SavedRun { resumed, rows: seen, history, modes, fields, run, .. } = *saved;
+        let SavedRun { resumed, rows: seen, history, modes, fields, reel: _, bars: _, run } = *saved;
         folder.reserve(RESERVED)?;
         let history = HistoryWriter::resume(&folder, names, bars, history)?;
         let fields = fields.map(|place| FieldsWriter::resume(&folder, scene.figure(), timed, place)).transpose()?;
         let rows = RowCounter::after(rows, seen);
-        let resumed = resumed + 1;
-        let kept = Instant::now();
-        let results = Self {
-            folder,
-            history,
-            fields,
-            modes,
-            rows,
-            resumed,
-            interval,
-            kept,
-            has_new_rows: false,
-            names: Vec::new(),
-        };
-        Ok((results, Some(run)))
+        Ok((Self::with(folder, (history, fields, modes), rows, interval, resumed + 1), Some(run)))
+    }
+
+    fn with(
+        folder: ResultFolder,
+        files: (HistoryWriter, Option<FieldsWriter>, ModesWriter),
+        rows: RowCounter,
+        interval: Option<Duration>,
+        resumed: u32,
+    ) -> Self {
+        let (history, fields, modes) = files;
+        let (kept, names) = (Instant::now(), Vec::new());
+        Self { folder, history, fields, modes, rows, resumed, interval, kept, has_news: false, names }
     }
 
     /// Writes a checkpoint.
@@ -215,7 +204,7 @@ impl Results {
             run,
         };
         saved.write(scene, &self.folder)?;
-        (self.kept, self.has_new_rows) = (Instant::now(), false);
+        (self.kept, self.has_news) = (Instant::now(), false);
         Ok(())
     }
 
@@ -224,6 +213,7 @@ impl Results {
         let history = self.history.complete();
         let is_finished = is_finished && history.is_ok();
         let modes = self.modes.finish(&self.folder).map(|names| self.names.extend(names));
+        let is_finished = is_finished && modes.is_ok();
         let fields = self
             .fields
             .take()
@@ -231,15 +221,14 @@ impl Results {
         history.and(modes).and(fields)
     }
 
-    /// Gives all results their names. A run that was stopped can go on from its checkpoint.
-    fn commit(self, result: &Result<(), Failure>, record: &mut Record) -> Result<(), OutputError> {
+    /// Gives all results their names, and returns the folder, which is still claimed.
+    fn commit(self, is_finished: bool, record: &mut Record) -> (ResultFolder, Result<(), OutputError>) {
         let Self { folder, history, mut names, .. } = self;
-        names.push(history.close(&folder, result.is_ok())?);
-        folder.commit(&names, record)?;
-        match result {
-            Err(Failure::Interrupted { .. } | Failure::Io(_)) => Ok(()),
-            Ok(()) | Err(_) => folder.forget_checkpoint(),
-        }
+        let named = history.close(&folder, is_finished).and_then(|name| {
+            names.push(name);
+            folder.commit(&names, record)
+        });
+        (folder, named)
     }
 }
 
@@ -278,7 +267,7 @@ impl Watcher<'_> {
         let dynamic = self.dynamic[at.stage - 1];
         let Some(results) = &mut self.results else { return Ok(self.unwritten.next(dynamic, at.time)) };
         let row = results.rows.next(dynamic, at.time);
-        results.has_new_rows = true;
+        results.has_news = true;
         match results.history.row(at, values, row).map_err(io_failure)? {
             Some(node) => Err(Failure::NonFinite { at, effect: Some("a column of the history"), node }),
             None => Ok(row),
@@ -314,12 +303,15 @@ impl Observer for Watcher<'_> {
 
     fn found(&mut self, stage: usize, result: &StageResult) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.found(result));
-        self.results.iter_mut().for_each(|results| results.modes.push(stage, result));
+        if let Some(results) = &mut self.results {
+            results.modes.push(stage, result);
+            results.has_news = true;
+        }
         Ok(())
     }
 
     fn wants_checkpoint(&mut self) -> bool {
-        let Some(Results { interval: Some(interval), kept, has_new_rows: true, .. }) = &self.results else {
+        let Some(Results { interval: Some(interval), kept, has_news: true, .. }) = &self.results else {
             return false;
         };
         kept.elapsed() >= *interval || signals::caught().is_some()

@@ -8,6 +8,7 @@ use super::folder::CHECKPOINT;
 use super::history::HistoryPlace;
 use super::{BarsPlace, FieldsPlace, ModesWriter, OutputError, Reel, ResultFolder};
 use crate::scene::Scene;
+use beamsim_core::run::Checkpoint;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs;
@@ -26,12 +27,14 @@ const CHECKSUM: usize = 8;
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 struct Origin {
     program: String,
+    /// The first stage whose end may change, from 0
+    first_open: usize,
     /// Of the deck, see [`fingerprint`]
     deck: u64,
 }
 
 /// A run that can go on, with its files as far as they are written. `R` is the run itself:
-/// [`Checkpoint`](beamsim_core::run::Checkpoint), or a reference to it.
+/// [`Checkpoint`], or a reference to it.
 #[derive(Deserialize, Serialize)]
 pub struct SavedRun<R> {
     /// How often the run has been resumed already
@@ -53,22 +56,24 @@ pub struct SavedRun<R> {
 }
 
 /// A checkpoint that was found in a folder of results.
-pub enum Found<R> {
+pub enum Found {
     /// There is none.
     Nothing,
     /// One of this deck and program
-    Own(Box<SavedRun<R>>),
+    Own(Box<SavedRun<Checkpoint>>),
     /// One that cannot be used, and why
     Other(String),
 }
 
-impl<R: Serialize> SavedRun<R> {
+impl SavedRun<&Checkpoint> {
     /// Writes the checkpoint of a scene, whole or not at all. The files that it tells of must be
     /// safe on the disk.
     pub fn write(&self, scene: &Scene, folder: &ResultFolder) -> Result<(), OutputError> {
         let path = folder.path().join(CHECKPOINT);
         let wrong = |error: postcard::Error| OutputError::content(&path, error);
-        let origin = Origin { program: PROGRAM.into(), deck: fingerprint(scene) };
+        // Error bars come from runs that have ended where the deck says.
+        let first_open = if self.bars.is_some() { usize::MAX } else { self.run.stage() };
+        let origin = Origin { program: PROGRAM.into(), first_open, deck: fingerprint(scene, first_open) };
         let body = postcard::to_stdvec(&origin).map_err(wrong)?;
         let body = postcard::to_extend(self, body).map_err(wrong)?;
         let checksum = xxh3_64(&body).to_le_bytes();
@@ -76,7 +81,7 @@ impl<R: Serialize> SavedRun<R> {
     }
 }
 
-impl<R: for<'de> Deserialize<'de>> Found<R> {
+impl Found {
     /// The checkpoint in a folder, as one of this scene.
     pub fn read(scene: &Scene, folder: &Path) -> Result<Self, OutputError> {
         let path = folder.join(CHECKPOINT);
@@ -93,7 +98,7 @@ impl<R: for<'de> Deserialize<'de>> Found<R> {
         if origin.program != PROGRAM {
             return Ok(Self::Other("it was written by another version of beamsim".into()));
         }
-        if origin.deck != fingerprint(scene) {
+        if origin.deck != fingerprint(scene, origin.first_open) {
             return Ok(Self::Other("it belongs to another deck".into()));
         }
         postcard::from_bytes(rest).map_or_else(damaged, |saved| Ok(Self::Own(Box::new(saved))))
@@ -107,15 +112,19 @@ fn body(bytes: &[u8]) -> Option<&[u8]> {
 }
 
 /// A fingerprint of a deck as far as it decides what a run computes: its numbers and words without
-/// the ends of stages and the choice of rows, which may change when a run is resumed.
-fn fingerprint(scene: &Scene) -> u64 {
+/// what may change when a run is resumed: title, expectations, the choice of rows, and the ends of
+/// stages from number `first_open` on, from 0.
+fn fingerprint(scene: &Scene, first_open: usize) -> u64 {
     let mut deck = scene.resolved.clone();
     let stages = deck.get_mut("stage").and_then(Value::as_array_mut);
-    for stage in stages.into_iter().flatten().filter_map(Value::as_object_mut) {
+    for stage in stages.into_iter().flatten().skip(first_open).filter_map(Value::as_object_mut) {
         stage.retain(|key, _| !["end", "until"].contains(&key.as_str()));
     }
     if let Some(output) = deck.get_mut("output").and_then(Value::as_object_mut) {
         output.retain(|key, _| !["every", "interval"].contains(&key.as_str()));
+    }
+    if let Some(deck) = deck.as_object_mut() {
+        deck.retain(|key, _| !["title", "expect"].contains(&key.as_str()));
     }
     xxh3_64(deck.to_string().as_bytes())
 }

@@ -1,7 +1,7 @@
 //! Files that are written under a temporary name and renamed when they are complete.
 
 use super::OutputError;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::hash::{BuildHasher, RandomState};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -32,12 +32,13 @@ impl PartFile {
             // What exists is neither opened nor followed.
             match File::create_new(&part) {
                 // The lock tells others that the file is not left by a dead process.
-                Ok(file) if file.try_lock().is_ok() && is_at(&file, &part) => {
-                    return Ok((Self { folder: folder.into(), part }, file));
-                }
-                Ok(_) if !part.exists() => {}
-                // The file system has no locks.
-                Ok(file) => return Ok((Self { folder: folder.into(), part }, file)),
+                Ok(file) => match file.try_lock() {
+                    // Another process has taken the new file for one of a dead process.
+                    Err(TryLockError::WouldBlock) => {}
+                    Ok(()) if !is_at(&file, &part) => {}
+                    // Without locks nobody looks for dead processes.
+                    Ok(()) | Err(TryLockError::Error(_)) => return Ok((Self { folder: folder.into(), part }, file)),
+                },
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(OutputError::file(&part, error)),
             }

@@ -57,7 +57,6 @@ impl ResultFolder {
             let reason = "is no folder: results are written into a folder".into();
             return Err(OutputError::Occupied { path: path.into(), reason });
         }
-        fs::create_dir_all(path).map_err(|error| OutputError::file(path, error))?;
         let folder = Self { path: path.into(), is_new, lock: lock(path)? };
         folder.refuse_obstacles(force)?;
         complete(path)?;
@@ -79,11 +78,6 @@ impl ResultFolder {
         if fields.is_dir() {
             fs::remove_dir_all(&fields).map_err(|error| OutputError::file(&fields, error))?;
         }
-        self.forget_checkpoint()
-    }
-
-    /// Removes the checkpoint of a run that has ended.
-    pub fn forget_checkpoint(&self) -> Result<(), OutputError> {
         remove_if_there(&self.path, CHECKPOINT)
     }
 
@@ -167,7 +161,8 @@ impl ResultFolder {
             may_replace(&self.path.join(name), kind, force)?;
         }
         let parts = tables().chain([RECORD, CHECKPOINT]).chain(INDICES).map(part);
-        for name in parts.chain([CHECKPOINT.into()]).chain(INDICES.map(String::from)) {
+        may_replace(&self.path.join(CHECKPOINT), OutputKind::Checkpoint, force)?;
+        for name in parts.chain(INDICES.map(String::from)) {
             refuse_obstacle(&self.path.join(name))?;
         }
         [FIELDS, PARTIAL_FIELDS].iter().try_for_each(|name| self.refuse_foreign_fields(name))
@@ -182,7 +177,9 @@ impl ResultFolder {
                 Err(_) => Ok(()),
             };
         };
-        let index = fs::read_to_string(self.path.join(format!("{name}.pvd"))).unwrap_or_default();
+        // A run that was killed may have given only the folder its name.
+        let index = [format!("{name}.pvd"), part(&format!("{name}.pvd"))];
+        let index = index.map(|index| fs::read_to_string(self.path.join(index)).unwrap_or_default()).concat();
         for entry in entries.flatten() {
             let file = entry.file_name();
             if !index.contains(&format!("file=\"{name}/{}\"", file.to_string_lossy())) {
@@ -216,8 +213,12 @@ fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
     let path = folder.join(LOCK);
     refuse_obstacle(&path)?;
     loop {
-        let file = File::options().write(true).create(true).truncate(false).open(&path);
-        let file = file.map_err(|error| OutputError::file(&path, error))?;
+        // The run before removes a folder that it has left empty.
+        fs::create_dir_all(folder).map_err(|error| OutputError::file(folder, error))?;
+        let file = match File::options().write(true).create(true).truncate(false).open(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => continue,
+            opened => opened.map_err(|error| OutputError::file(&path, error))?,
+        };
         match file.try_lock() {
             Ok(()) if is_at(&file, &path) => return Ok(Some(file)),
             // The run before has removed the file in the meantime.
@@ -257,11 +258,16 @@ fn complete(folder: &Path) -> Result<(), OutputError> {
             tables().try_for_each(|name| remove_if_there(folder, name))?;
             remove_if_there(folder, "report.html")?;
             remove_fields(folder)?;
+            if !record.may_be_resumed() {
+                remove_if_there(folder, CHECKPOINT)?;
+            }
             rename(part(RECORD), RECORD)?;
         }
     }
     let Ok(record) = Record::read(folder) else { return Ok(()) };
-    for file in &record.files {
+    // A record of a stranger names no other files.
+    let is_result = |file: &&FileRecord| tables().chain(INDICES).any(|name| name == file.name);
+    for file in record.files.iter().filter(is_result) {
         let name = &file.name;
         if folder.join(name).exists() || !is_whole(folder, file) {
             continue;

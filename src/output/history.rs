@@ -136,7 +136,7 @@ pub struct HistoryPlace {
 
 /// Writes the history of a run.
 pub struct HistoryWriter {
-    writer: csv::Writer<File>,
+    writer: csv::Writer<RowFile>,
     names: Vec<String>,
     side_columns: Option<Box<dyn SideColumns>>,
     text: String,
@@ -156,7 +156,7 @@ impl HistoryWriter {
         names: Vec<String>,
         side_columns: Option<Box<dyn SideColumns>>,
     ) -> Result<Self, OutputError> {
-        let mut writer = csv::Writer::from_writer(folder.create(HISTORY)?);
+        let mut writer = csv::Writer::from_writer(RowFile::new(folder.create(HISTORY)?));
         let others = side_columns.as_ref().map_or(Vec::new(), |side| side.names(&names));
         let mut header: Vec<&str> = clocks().collect();
         header.extend(names.iter().chain(&others).map(String::as_str));
@@ -166,7 +166,7 @@ impl HistoryWriter {
         Ok(Self::with(writer, names, side_columns))
     }
 
-    fn with(writer: csv::Writer<File>, names: Vec<String>, side_columns: Option<Box<dyn SideColumns>>) -> Self {
+    fn with(writer: csv::Writer<RowFile>, names: Vec<String>, side_columns: Option<Box<dyn SideColumns>>) -> Self {
         Self {
             writer,
             names,
@@ -187,7 +187,12 @@ impl HistoryWriter {
         place: HistoryPlace,
     ) -> Result<Self, OutputError> {
         if !folder.part(HISTORY).exists() {
-            folder.reopen(PARTIAL_HISTORY, HISTORY)?;
+            // The run was stopped, or killed while it gave its files their names.
+            if folder.part(PARTIAL_HISTORY).exists() {
+                folder.rename_part(PARTIAL_HISTORY, HISTORY)?;
+            } else {
+                folder.reopen(PARTIAL_HISTORY, HISTORY)?;
+            }
         }
         let path = folder.part(HISTORY);
         let wrong = |error| OutputError::file(&path, error);
@@ -196,7 +201,7 @@ impl HistoryWriter {
             return Err(OutputError::content(&path, "is shorter than its checkpoint says: use --fresh"));
         }
         file.set_len(place.bytes).and_then(|()| file.seek(SeekFrom::End(0))).map_err(wrong)?;
-        let mut writer = Self::with(csv::Writer::from_writer(file), names, side_columns);
+        let mut writer = Self::with(csv::Writer::from_writer(RowFile::new(file)), names, side_columns);
         writer.pending = place.pending.is_some();
         writer.record = place.pending.unwrap_or_default().into();
         writer.held_back = place.held_back.into_iter().map(csv::ByteRecord::from).collect();
@@ -206,7 +211,7 @@ impl HistoryWriter {
     /// Makes the rows so far safe on the disk, and tells what it takes to go on behind them.
     pub fn place(&mut self) -> Result<HistoryPlace, OutputError> {
         self.writer.flush()?;
-        let file = self.writer.get_ref();
+        let file = &self.writer.get_ref().file;
         file.sync_all()?;
         let fields =
             |record: &csv::ByteRecord| record.iter().map(|f| String::from_utf8_lossy(f).into_owned()).collect();
@@ -274,7 +279,7 @@ impl HistoryWriter {
         }
         self.write_held_back()?;
         self.writer.flush()?;
-        Ok(self.writer.get_ref().sync_all()?)
+        Ok(self.writer.get_ref().file.sync_all()?)
     }
 
     /// Closes the file, and returns the name that it is to get: `history.csv` if the run finished,
@@ -283,12 +288,39 @@ impl HistoryWriter {
         if finished {
             return Ok(HISTORY);
         }
-        // What is still in memory could not be written before, and is dropped.
         drop(self.writer);
         let path = folder.part(HISTORY);
         keep_whole_rows(&path).map_err(|error| OutputError::file(&path, error))?;
         folder.rename_part(HISTORY, PARTIAL_HISTORY)?;
         Ok(PARTIAL_HISTORY)
+    }
+}
+
+/// The file of a history. After an error nothing more is written: rows behind half a row would be
+/// taken for whole ones.
+struct RowFile {
+    file: File,
+    is_broken: bool,
+}
+
+impl RowFile {
+    fn new(file: File) -> Self {
+        Self { file, is_broken: false }
+    }
+}
+
+impl io::Write for RowFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.is_broken {
+            return Err(io::Error::other("an earlier row could not be written"));
+        }
+        let written = self.file.write(bytes);
+        self.is_broken = written.as_ref().is_err_and(|error| error.kind() != io::ErrorKind::Interrupted);
+        written
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
     }
 }
 

@@ -34,6 +34,8 @@ pub enum OutputKind {
     Png,
     /// Reports
     Page,
+    /// checkpoint
+    Checkpoint,
     /// Manual pages
     Manual,
 }
@@ -55,6 +57,7 @@ impl OutputKind {
             Self::Svg => begins("<svg ") && holds("<!-- beamsim "),
             Self::Png => begins_with_png(head) && holds("Software\0beamsim "),
             Self::Page => holds("<meta name=\"generator\" content=\"beamsim "),
+            Self::Checkpoint => begins("beamsim checkpoint\n"),
             Self::Manual => holds(".TH beamsim"),
         }
     }

@@ -352,6 +352,11 @@ impl Record {
         serde_json::from_slice(&bytes).map_err(|error| OutputError::content(path, error))
     }
 
+    /// True if the run can go on from its checkpoint: it was stopped from outside.
+    pub fn may_be_resumed(&self) -> bool {
+        [FailureKind::Interrupted, FailureKind::Io, FailureKind::Limit].iter().any(|kind| kind.name() == self.status)
+    }
+
     /// True if a file of the run is not there.
     pub fn misses_files(&self, folder: &Path) -> bool {
         self.files.iter().any(|file| !folder.join(&file.name).exists())

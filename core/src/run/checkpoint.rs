@@ -36,6 +36,11 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
+    /// The stage, from 0.
+    pub fn stage(&self) -> usize {
+        self.number
+    }
+
     /// The number of steps and levels that lie behind.
     pub fn steps(&self) -> u64 {
         self.counters.steps
@@ -49,7 +54,6 @@ pub(super) struct StageCheckpoint {
     pub is_planar: bool,
     pub fresh: bool,
     pub soft: bool,
-    pub keeps_account: bool,
     pub cutbacks_before: u64,
     pub prescribed_increment: Vec<Vec3>,
     /// The numbers of evaluated instances, by effect

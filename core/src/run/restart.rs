@@ -10,6 +10,8 @@ use crate::solve::Tangent;
 impl StageRun<'_> {
     /// Shows the observer a checkpoint, if it wants one. Called between rows.
     pub fn offer_checkpoint(&mut self, analysis: impl FnOnce() -> AnalysisCheckpoint) -> Result<(), Failure> {
+        // Work that a request has cut short is no place to go on from.
+        self.unless_interrupted()?;
         if !self.observer.wants_checkpoint() {
             return Ok(());
         }
@@ -17,7 +19,6 @@ impl StageRun<'_> {
             is_planar: self.plane.is_some(),
             fresh: self.fresh,
             soft: self.soft,
-            keeps_account: self.keeps_account,
             cutbacks_before: self.cutbacks_before,
             prescribed_increment: self.prescribed_increment.clone(),
             evaluations: self.assembly.evaluations.iter().map(|&(_, count)| count).collect(),
@@ -49,7 +50,18 @@ impl StageRun<'_> {
 
     /// Takes up the stage where a checkpoint has left it.
     pub fn take_up(&mut self, from: StageCheckpoint) -> Result<(), Failure> {
-        let StageCheckpoint { prescribed_increment, evaluations, linear, newton, analysis, .. } = from;
+        let StageCheckpoint {
+            is_planar: _,
+            fresh: _,
+            soft,
+            cutbacks_before,
+            prescribed_increment,
+            evaluations,
+            linear,
+            newton,
+            analysis,
+        } = from;
+        (self.soft, self.cutbacks_before) = (soft, cutbacks_before);
         self.prescribed_increment = prescribed_increment;
         let counted = self.assembly.evaluations.iter_mut().zip(evaluations);
         counted.for_each(|((_, count), before)| *count = before);

@@ -176,6 +176,8 @@ impl<'o> Run<'o> {
 
     /// Shows the observer a checkpoint before the start of a stage, if it wants one.
     fn offer_checkpoint(&mut self, number: usize) -> Result<(), Failure> {
+        let at = Moment { stage: number + 1, time: self.state.time, load: self.state.load };
+        unless_interrupted(at)?;
         if !self.observer.wants_checkpoint() {
             return Ok(());
         }

@@ -84,6 +84,7 @@ impl LoadLevels<'_, '_> {
         let LevelsCheckpoint { reached, levels, follows_signs, is_given, unflattened, signature, at_start } =
             checkpoint;
         let stability = Stability::again(follows_signs, signature);
+        self.stage.unflattened.clone_from(&unflattened);
         if is_given {
             self.stage.make_again(|stage| Stability::follow_again(stage, unflattened));
         }
@@ -131,18 +132,20 @@ impl LevelControl<'_, '_> {
         }
         let Self { stage, levels, stability, at_start, .. } = self;
         let is_given = stage.newton.is_given(&stage.assembly.system);
-        let unflattened = stage.unflattened.clone();
-        stage.offer_checkpoint(|| {
+        let unflattened = std::mem::take(&mut stage.unflattened);
+        let offered = stage.offer_checkpoint(|| {
             AnalysisCheckpoint::Levels(LevelsCheckpoint {
                 reached,
                 levels: levels.clone(),
                 follows_signs: stability.counts(),
                 is_given,
-                unflattened,
+                unflattened: unflattened.clone(),
                 signature: stability.signature,
                 at_start: *at_start,
             })
-        })
+        });
+        stage.unflattened = unflattened;
+        offered
     }
 
     /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or
@@ -265,7 +268,7 @@ impl LevelControl<'_, '_> {
                 Ok(Reached::Over)
             }
             Ok(Arrival::Goal) => {
-                self.resume(target, increments);
+                self.take_load_control_up(target, increments);
                 Ok(Reached::Along)
             }
             Ok(Arrival::OutOfSteps) => Err(limit),
@@ -277,7 +280,7 @@ impl LevelControl<'_, '_> {
     }
 
     /// Load control goes on where a detour has come to its level.
-    fn resume(&mut self, target: f64, increments: u64) {
+    fn take_load_control_up(&mut self, target: f64, increments: u64) {
         self.stage.good.copy_from(self.stage.state);
         self.stability.signature = self.stability.look(self.stage);
         self.levels.restart();
