@@ -43,6 +43,13 @@ impl RestartArguments {
                 Ok(Target { folder, saved: None, interval })
             }
             Found::Own(saved) if self.resume => {
+                let time = saved.run.time();
+                if let Some(end) = scene.plan.stages[saved.run.stage()].work.end().filter(|&end| end < time) {
+                    return refuse(format!(
+                        "the run in {place} is at time {time} already, behind `end` = {end} of its stage: resume it \
+                         with a later end, or add --fresh to begin anew"
+                    ));
+                }
                 console::note(&format!("{name}: goes on after {} steps and levels", saved.run.steps()));
                 Ok(Target { folder, saved: Some(saved), interval })
             }

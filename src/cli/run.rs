@@ -46,6 +46,8 @@ fn run_one(
 ) -> Result<(), CommandError> {
     let loaded = load::deck(path, settings)?;
     let results = outputs::claim(folder)?;
+    // From here on a signal stops what is under way, and leaves the folder in order.
+    let _kept = signals::keep();
     let mut chosen = wanted.choose(name, path, loaded, &results)?;
     let mut target = wanted.restart.target(name, results, &chosen.loaded.scene)?;
     let missed = chosen.missed.take();
@@ -92,6 +94,9 @@ fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
             if !matches!(failure, Failure::Io(_)) {
                 let partial = folder.join("history.partial.csv");
                 console::line(&format!("  results up to the failure: {}", partial.display()));
+            }
+            if folder.join("checkpoint").exists() {
+                console::note("the run can go on from its checkpoint: repeat the command with --resume");
             }
             if let Some(hint) = failure.hint(&scene.plan) {
                 console::note(&format!("hint: {hint}"));

@@ -7,10 +7,10 @@
 use super::console;
 use super::status::Status;
 use beamsim_core::interrupt;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::iterator::Signals;
-use std::sync::atomic::{AtomicI32, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -65,6 +65,8 @@ pub fn caught() -> Option<i32> {
 /// From here on signals are heard. If the system gives no thread for that, they end the process as
 /// they would anyway.
 pub fn listen() {
+    // A file that may not grow is an error of writing, not the end of the process.
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
     let hear_all = || {
         let Ok(mut signals) = Signals::new(heard()) else { return };
         let mut first = None;

@@ -99,7 +99,7 @@ impl Found {
             return Ok(Self::Other("it was written by another version of beamsim".into()));
         }
         if origin.deck != fingerprint(scene, origin.first_open) {
-            return Ok(Self::Other("it belongs to another deck".into()));
+            return Ok(Self::Other("it belongs to another deck, or to this one with other settings or columns".into()));
         }
         postcard::from_bytes(rest).map_or_else(damaged, |saved| Ok(Self::Own(Box::new(saved))))
     }

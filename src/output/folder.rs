@@ -212,6 +212,9 @@ impl Drop for ResultFolder {
 fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
     let path = folder.join(LOCK);
     refuse_obstacle(&path)?;
+    if fs::metadata(&path).is_ok_and(|found| found.len() > 0) {
+        return Err(OutputError::content(&path, "is in the way of the results: it is not a lock (move it away)"));
+    }
     loop {
         // The run before removes a folder that it has left empty.
         fs::create_dir_all(folder).map_err(|error| OutputError::file(folder, error))?;

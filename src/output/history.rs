@@ -10,11 +10,14 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use xxhash_rust::xxh3::Xxh3;
 
 /// The name of the history of a run that finished.
 const HISTORY: &str = "history.csv";
 /// The name of the history of a run that did not.
 const PARTIAL_HISTORY: &str = "history.partial.csv";
+/// Bytes of a file that are read at once
+const READ_AT_ONCE: usize = 1 << 16;
 /// Bytes that a row has at most
 const LONGEST_ROW: u64 = 64 << 20;
 /// Rows are handed to the system at least so often, as long as there are new ones.
@@ -128,6 +131,8 @@ pub struct CompanionPlace {
 pub struct HistoryPlace {
     /// The length of the file
     bytes: u64,
+    /// XXH3 of 64 bits of the file
+    checksum: u64,
     /// The last row, if it is written only if no other follows
     pending: Option<Vec<String>>,
     /// Rows whose additional numbers are not known yet
@@ -136,6 +141,8 @@ pub struct HistoryPlace {
 
 /// Writes the history of a run.
 pub struct HistoryWriter {
+    /// The path of the file, for messages
+    path: PathBuf,
     writer: csv::Writer<RowFile>,
     names: Vec<String>,
     side_columns: Option<Box<dyn SideColumns>>,
@@ -163,11 +170,17 @@ impl HistoryWriter {
         writer.write_record(header)?;
         // A full disk is told before the run begins.
         writer.flush()?;
-        Ok(Self::with(writer, names, side_columns))
+        Ok(Self::with(folder.part(HISTORY), writer, names, side_columns))
     }
 
-    fn with(writer: csv::Writer<RowFile>, names: Vec<String>, side_columns: Option<Box<dyn SideColumns>>) -> Self {
+    fn with(
+        path: PathBuf,
+        writer: csv::Writer<RowFile>,
+        names: Vec<String>,
+        side_columns: Option<Box<dyn SideColumns>>,
+    ) -> Self {
         Self {
+            path,
             writer,
             names,
             side_columns,
@@ -190,18 +203,24 @@ impl HistoryWriter {
             // The run was stopped, or killed while it gave its files their names.
             if folder.part(PARTIAL_HISTORY).exists() {
                 folder.rename_part(PARTIAL_HISTORY, HISTORY)?;
-            } else {
+            } else if folder.path().join(PARTIAL_HISTORY).exists() {
                 folder.reopen(PARTIAL_HISTORY, HISTORY)?;
+            } else {
+                let reason = "belongs to the checkpoint and is missing: use --fresh to begin anew";
+                return Err(OutputError::content(&folder.path().join(PARTIAL_HISTORY), reason));
             }
         }
         let path = folder.part(HISTORY);
         let wrong = |error| OutputError::file(&path, error);
         let mut file = File::options().read(true).write(true).open(&path).map_err(wrong)?;
-        if file.metadata().map_err(wrong)?.len() < place.bytes {
-            return Err(OutputError::content(&path, "is shorter than its checkpoint says: use --fresh"));
+        let hasher = hash_of(&mut file, place.bytes).map_err(wrong)?;
+        if hasher.digest() != place.checksum {
+            let reason = "was changed since its checkpoint was written: use --fresh to begin anew";
+            return Err(OutputError::content(&path, reason));
         }
         file.set_len(place.bytes).and_then(|()| file.seek(SeekFrom::End(0))).map_err(wrong)?;
-        let mut writer = Self::with(csv::Writer::from_writer(RowFile::new(file)), names, side_columns);
+        let file = RowFile { hasher, ..RowFile::new(file) };
+        let mut writer = Self::with(path, csv::Writer::from_writer(file), names, side_columns);
         writer.pending = place.pending.is_some();
         writer.record = place.pending.unwrap_or_default().into();
         writer.held_back = place.held_back.into_iter().map(csv::ByteRecord::from).collect();
@@ -217,6 +236,7 @@ impl HistoryWriter {
             |record: &csv::ByteRecord| record.iter().map(|f| String::from_utf8_lossy(f).into_owned()).collect();
         Ok(HistoryPlace {
             bytes: file.metadata()?.len(),
+            checksum: self.writer.get_ref().hasher.digest(),
             pending: self.pending.then(|| fields(&self.record)),
             held_back: self.held_back.iter().map(fields).collect(),
         })
@@ -243,10 +263,11 @@ impl HistoryWriter {
         if self.side_columns.is_some() {
             self.hold_back(at, values, row.dynamic)?;
         } else if !self.pending {
-            self.writer.write_byte_record(&self.record)?;
+            let written = self.writer.write_byte_record(&self.record);
+            written.map_err(|error| OutputError::file(&self.path, error.into()))?;
         }
         if self.flushed.elapsed() >= FLUSH_INTERVAL {
-            self.writer.flush()?;
+            self.writer.flush().map_err(|error| OutputError::file(&self.path, error))?;
             self.flushed = Instant::now();
         }
         Ok(None)
@@ -267,7 +288,8 @@ impl HistoryWriter {
         let numbers = self.side_columns.as_ref().map_or(Vec::new(), |side| side.numbers());
         for mut record in self.held_back.drain(..) {
             push(&mut record, &mut self.text, &numbers);
-            self.writer.write_byte_record(&record)?;
+            let written = self.writer.write_byte_record(&record);
+            written.map_err(|error| OutputError::file(&self.path, error.into()))?;
         }
         Ok(())
     }
@@ -300,12 +322,14 @@ impl HistoryWriter {
 /// taken for whole ones.
 struct RowFile {
     file: File,
+    /// Of what is written
+    hasher: Xxh3,
     is_broken: bool,
 }
 
 impl RowFile {
     fn new(file: File) -> Self {
-        Self { file, is_broken: false }
+        Self { file, hasher: Xxh3::new(), is_broken: false }
     }
 }
 
@@ -315,12 +339,28 @@ impl io::Write for RowFile {
             return Err(io::Error::other("an earlier row could not be written"));
         }
         let written = self.file.write(bytes);
+        if let Ok(count) = written {
+            self.hasher.update(&bytes[..count]);
+        }
         self.is_broken = written.as_ref().is_err_and(|error| error.kind() != io::ErrorKind::Interrupted);
         written
     }
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
+    }
+}
+
+/// The hash of the first bytes of a file.
+fn hash_of(file: &mut File, bytes: u64) -> io::Result<Xxh3> {
+    let mut hasher = Xxh3::new();
+    let mut first = file.take(bytes);
+    let mut buffer = vec![0; READ_AT_ONCE];
+    loop {
+        match first.read(&mut buffer)? {
+            0 => return Ok(hasher),
+            count => hasher.update(&buffer[..count]),
+        }
     }
 }
 

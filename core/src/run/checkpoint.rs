@@ -41,6 +41,11 @@ impl Checkpoint {
         self.number
     }
 
+    /// The time that the run has come to.
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+
     /// The number of steps and levels that lie behind.
     pub fn steps(&self) -> u64 {
         self.counters.steps

@@ -34,6 +34,9 @@ impl Report<'_> {
     }
 
     fn page(&self, results: &Path, mut film: Film) -> Result<String, OutputError> {
+        for name in ["modes.csv", "buckling.csv"].into_iter().filter(|name| results.join(name).exists()) {
+            self.record.refuse_foreign(results, name)?;
+        }
         let history = HistoryReader::of_results(results)?.map(|path| HistoryReader::read(&path)).transpose()?;
         let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
         // The last row of a run that was stopped is the one of that moment, which the film passes
