@@ -297,8 +297,8 @@ impl Observer for Watcher<'_> {
         self.values = values;
         let row = row?;
         self.film.iter_mut().for_each(|film| film.row(snapshot, row));
-        let fields = self.results.iter_mut().filter_map(|results| results.fields.as_mut());
-        fields.map(|fields| fields.row(snapshot, row)).collect::<Result<(), _>>().map_err(io_failure)
+        let mut fields = self.results.iter_mut().filter_map(|results| results.fields.as_mut());
+        fields.try_for_each(|fields| fields.row(snapshot, row)).map_err(io_failure)
     }
 
     fn found(&mut self, stage: usize, result: &StageResult) -> Result<(), Failure> {

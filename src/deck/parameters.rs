@@ -79,7 +79,7 @@ impl Parameters {
                 continue;
             };
             if let Some(start) = path.iter().position(|known| *known == next) {
-                let circle = [&path[start..], &[next.clone()]].concat().join(" -> ");
+                let circle = [&path[start..], std::slice::from_ref(&next)].concat().join(" -> ");
                 let message = format!("parameters refer to each other in a circle: {circle}");
                 diagnostics.push(Diagnostic::error(message, entries[&next].span.clone()));
                 self.broken.extend(path.drain(start..));

@@ -256,16 +256,15 @@ fn complete(folder: &Path) -> Result<(), OutputError> {
         let path = folder.join(to);
         fs::rename(folder.join(from), &path).map_err(|error| OutputError::file(&path, error))
     };
-    if let Ok(record) = Record::read_from(&folder.join(part(RECORD))) {
-        if record.files.iter().all(|file| is_whole(folder, file)) {
-            tables().try_for_each(|name| remove_if_there(folder, name))?;
-            remove_if_there(folder, "report.html")?;
-            remove_fields(folder)?;
-            if !record.may_be_resumed() {
-                remove_if_there(folder, CHECKPOINT)?;
-            }
-            rename(part(RECORD), RECORD)?;
+    let is_complete = |record: &Record| record.files.iter().all(|file| is_whole(folder, file));
+    if let Some(record) = Record::read_from(&folder.join(part(RECORD))).ok().filter(is_complete) {
+        tables().try_for_each(|name| remove_if_there(folder, name))?;
+        remove_if_there(folder, "report.html")?;
+        remove_fields(folder)?;
+        if !record.may_be_resumed() {
+            remove_if_there(folder, CHECKPOINT)?;
         }
+        rename(part(RECORD), RECORD)?;
     }
     let Ok(record) = Record::read(folder) else { return Ok(()) };
     // A record of a stranger names no other files.
@@ -275,10 +274,8 @@ fn complete(folder: &Path) -> Result<(), OutputError> {
         if folder.join(name).exists() || !is_whole(folder, file) {
             continue;
         }
-        if let Some(fields) = name.strip_suffix(".pvd") {
-            if folder.join(part(FIELDS)).is_dir() {
-                rename(part(FIELDS), fields)?;
-            }
+        if let Some(fields) = name.strip_suffix(".pvd").filter(|_| folder.join(part(FIELDS)).is_dir()) {
+            rename(part(FIELDS), fields)?;
         }
         rename(part(name), name)?;
     }
