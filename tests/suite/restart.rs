@@ -78,7 +78,10 @@ fn a_killed_run_goes_on_with_the_bytes_of_one_that_was_not() {
     folder.write("swing.toml", SWING);
     assert_eq!(status(&folder.beamsim(&["run", "swing.toml", "-q", "--out", "whole"])), 0);
     run_and_kill(&folder, "killed");
-    assert_eq!(folder.names("killed"), [".lock", "checkpoint", "history.csv.part", "run.json.part"]);
+    let mut left = folder.names("killed");
+    // The kill may have come while the next checkpoint was written.
+    left.retain(|name| name != "checkpoint.part");
+    assert_eq!(left, [".lock", "checkpoint", "history.csv.part", "run.json.part"]);
     // Nothing is lost or begun anew by accident.
     let asked = folder.beamsim(&["run", "swing.toml", "-q", "--out", "killed"]);
     assert_eq!(status(&asked), 2);
