@@ -60,6 +60,8 @@ impl ResultFolder {
         let folder = Self { path: path.into(), is_new, lock: lock(path)? };
         folder.refuse_obstacles(force)?;
         complete(path)?;
+        // Half a checkpoint serves nobody: the whole one before it is still there.
+        remove_if_there(path, &part(CHECKPOINT))?;
         Ok(folder)
     }
 
