@@ -127,6 +127,8 @@ fn fault_of(text: &str, diagnostic: &Diagnostic) -> Option<String> {
         Some(span) if span.start > text.len() || span.end < span.start => {
             Some(format!("no such place in the deck: {span:?} of {} bytes: {message}", text.len()))
         }
+        // The count of messages that are not shown is about no place.
+        None if message.contains("more messages are not shown") => None,
         None if !message.contains(['`', '[', '"']) => Some(format!("neither place nor name: {message}")),
         Some(_) | None => None,
     }
