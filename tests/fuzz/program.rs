@@ -37,7 +37,7 @@ pub fn try_deck(input: &Input, corpus: &Corpus, folder: &Path) -> io::Result<Tri
     let deck = folder.join("deck.toml");
     fs::create_dir_all(folder)?;
     // The program has the same names of tables in the folder as the corpus has.
-    let text = if input.table.is_some() { whole_text(input, corpus).ok() } else { None };
+    let text = if input.table.is_some() || input.text.contains("csv") { whole_text(input, corpus).ok() } else { None };
     fs::write(&deck, text.as_ref().unwrap_or(&input.text))?;
     let settings = if text.is_some() { &[][..] } else { &input.settings[..] };
     let command = |name: &str| {
