@@ -39,7 +39,7 @@ impl<const N: usize> Connection<N> {
 
     /// Increments of displacements and of rotation vectors at the nodes, in the chart of the first
     /// node, from increments `dq` of the unknowns by slot.
-    pub fn variations_in_one_chart(&self, at: &State, dq: &dyn Fn(Slot) -> Vec3) -> ([Vec3; N], [Vec3; N]) {
+    pub fn variations_in_one_chart(&self, at: &State, dq: impl Fn(Slot) -> Vec3) -> ([Vec3; N], [Vec3; N]) {
         let du = self.nodes.map(|node| dq(node.u));
         let dp = self.nodes.map(|node| dq(node.p));
         match at.mixed[self.element as usize] {

@@ -12,25 +12,48 @@ use super::issued::IssuedWarnings;
 use super::snapshot::Counters;
 use super::statics::checkpoint::{ArcLengthCheckpoint, LevelsCheckpoint};
 use crate::kernel::Weights;
-use crate::model::Schedule;
+use crate::model::{Model, Schedule};
 use crate::solve::NewtonMemory;
 use crate::system::State;
 use crate::tensor::Vec3;
 use serde::{Deserialize, Serialize};
+
+/// All of a run that changes.
+#[derive(Clone, Deserialize, Serialize)]
+pub(super) struct RunState {
+    /// The courses of loads and motions
+    pub schedule: Schedule,
+    pub state: State,
+    /// The last converged state
+    pub good: State,
+    pub counters: Counters,
+    pub issued: IssuedWarnings,
+    pub bookkeeper: Bookkeeper,
+    pub past: EarlierStages,
+}
+
+impl RunState {
+    /// A run of a scene at its start.
+    pub fn new(model: &Model) -> Self {
+        let state = model.rest();
+        Self {
+            schedule: Schedule::new(model),
+            good: state.clone(),
+            state,
+            counters: Counters::default(),
+            issued: IssuedWarnings::default(),
+            bookkeeper: Bookkeeper::default(),
+            past: EarlierStages::default(),
+        }
+    }
+}
 
 /// A run between two rows.
 #[derive(Deserialize, Serialize)]
 pub struct Checkpoint {
     /// The stage, from 0
     pub(super) number: usize,
-    pub(super) schedule: Schedule,
-    pub(super) state: State,
-    /// The last converged state
-    pub(super) good: State,
-    pub(super) counters: Counters,
-    pub(super) issued: IssuedWarnings,
-    pub(super) bookkeeper: Bookkeeper,
-    pub(super) past: EarlierStages,
+    pub(super) run: RunState,
     /// Where the stage is; `None` before its start
     pub(super) stage: Option<StageCheckpoint>,
 }
@@ -43,12 +66,12 @@ impl Checkpoint {
 
     /// The time that the run has come to.
     pub fn time(&self) -> f64 {
-        self.state.time
+        self.run.state.time
     }
 
     /// The number of steps and levels that lie behind.
     pub fn steps(&self) -> u64 {
-        self.counters.steps
+        self.run.counters.steps
     }
 }
 
@@ -57,9 +80,13 @@ impl Checkpoint {
 pub(super) struct StageCheckpoint {
     /// The stage is treated in the plane of the scene.
     pub is_planar: bool,
+    /// Loads act for the first time in it.
     pub fresh: bool,
+    /// Round-off takes the stiffness of the softest motion.
     pub soft: bool,
+    /// Attempts that earlier stages have taken back
     pub cutbacks_before: u64,
+    /// Increments of prescribed directions, see [`StageRun`](super::stage_run::StageRun)
     pub prescribed_increment: Vec<Vec3>,
     /// The numbers of evaluated instances, by effect
     pub evaluations: Vec<u64>,

@@ -1,6 +1,6 @@
 //! Checkpoints of a stage: how they are taken, and how the stage goes on from one.
 
-use super::checkpoint::{AnalysisCheckpoint, Checkpoint, LinearCheckpoint, StageCheckpoint};
+use super::checkpoint::{AnalysisCheckpoint, Checkpoint, LinearCheckpoint, RunState, StageCheckpoint};
 use super::failure::Failure;
 use super::stage_run::StageRun;
 use crate::kernel::Weights;
@@ -26,8 +26,7 @@ impl StageRun<'_> {
             newton: self.newton.memory(),
             analysis: analysis(),
         };
-        let checkpoint = Checkpoint {
-            number: self.number,
+        let run = RunState {
             schedule: self.schedule.clone(),
             state: self.state.clone(),
             good: self.good.clone(),
@@ -35,9 +34,8 @@ impl StageRun<'_> {
             issued: self.issued.clone(),
             bookkeeper: self.bookkeeper.clone(),
             past: self.past.clone(),
-            stage: Some(stage),
         };
-        self.observer.checkpoint(&checkpoint)
+        self.observer.checkpoint(&Checkpoint { number: self.number, run, stage: Some(stage) })
     }
 
     fn linear_checkpoint(&self) -> Option<LinearCheckpoint> {
@@ -92,9 +90,10 @@ impl StageRun<'_> {
         let is_dynamic = self.stage().work.kind().advances_time();
         let Self { assembly, state, newton, .. } = self;
         assembly.evaluate(state, weights, None);
-        let mut tangent = match is_dynamic {
-            true => Tangent::that_may_go(assembly, state, weights),
-            false => Tangent::that_stays(assembly, state),
+        let mut tangent = if is_dynamic {
+            Tangent::that_may_go(assembly, state, weights)
+        } else {
+            Tangent::that_stays(assembly, state)
         };
         newton.solver.factorise_new(&mut tangent);
     }

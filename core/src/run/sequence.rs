@@ -1,12 +1,9 @@
 //! A run from its plan: the stages one after the other, watched by an observer.
 
 use super::buckling::Buckling;
-use super::checkpoint::{Checkpoint, StageCheckpoint};
+use super::checkpoint::{Checkpoint, RunState, StageCheckpoint};
 use super::dynamics::Dynamics;
-use super::earlier_stages::EarlierStages;
-use super::energy::Bookkeeper;
 use super::failure::{Failure, Moment};
-use super::issued::IssuedWarnings;
 use super::modal::Modal;
 use super::naming::describe;
 use super::observer::Observer;
@@ -15,24 +12,16 @@ use super::rehearsal::lacking;
 use super::snapshot::Counters;
 use super::stage_run::{Analysis, StageRun, newton_for, unless_interrupted};
 use super::statics::{ArcLength, LoadLevels};
-use crate::model::{Assembly, Model, Schedule};
-use crate::system::{DofMap, State};
+use crate::model::{Assembly, Model};
+use crate::system::DofMap;
 use std::sync::Arc;
 
 /// A run in progress, between its stages.
 pub struct Run<'o> {
     plan: Plan,
     model: Arc<Model>,
-    /// The courses of loads and motions
-    schedule: Schedule,
-    state: State,
-    /// The last converged state
-    good: State,
     observer: &'o mut dyn Observer,
-    counters: Counters,
-    issued: IssuedWarnings,
-    bookkeeper: Bookkeeper,
-    past: EarlierStages,
+    run: RunState,
     /// The first stage to run, from 0
     first: usize,
     /// Where a checkpoint has left that stage, if it had begun
@@ -43,47 +32,19 @@ impl<'o> Run<'o> {
     /// A run at its start.
     pub fn new(plan: Plan, observer: &'o mut dyn Observer) -> Self {
         let model = plan.model.clone();
-        let state = model.rest();
-        Self {
-            plan,
-            schedule: Schedule::new(&model),
-            model,
-            good: state.clone(),
-            state,
-            observer,
-            counters: Counters::default(),
-            issued: IssuedWarnings::default(),
-            bookkeeper: Bookkeeper::default(),
-            past: EarlierStages::default(),
-            first: 0,
-            begun: None,
-        }
+        Self { plan, run: RunState::new(&model), model, observer, first: 0, begun: None }
     }
 
     /// A run that goes on from a checkpoint of the same plan.
     pub fn resume(plan: Plan, from: Checkpoint, observer: &'o mut dyn Observer) -> Self {
-        let Checkpoint { number, schedule, state, good, counters, issued, bookkeeper, past, stage } = from;
-        let model = plan.model.clone();
-        Self {
-            plan,
-            model,
-            schedule,
-            state,
-            good,
-            observer,
-            counters,
-            issued,
-            bookkeeper,
-            past,
-            first: number,
-            begun: stage,
-        }
+        let Checkpoint { number, run, stage } = from;
+        Self { model: plan.model.clone(), plan, run, observer, first: number, begun: stage }
     }
 
     /// Runs all stages. Whatever happens, the counters tell how far it came.
     pub fn finish(mut self) -> (Result<(), Failure>, Counters) {
         let result = (self.first..self.plan.stages.len()).try_for_each(|number| self.run_stage(number));
-        (result, self.counters)
+        (result, self.run.counters)
     }
 
     /// Runs stage number `number`, from 0. After a request to stop it has come to no other end.
@@ -92,7 +53,7 @@ impl<'o> Run<'o> {
         if matches!(result, Err(Failure::Io(_) | Failure::Interrupted { .. })) {
             return result;
         }
-        let at = Moment { stage: number + 1, time: self.state.time, load: self.state.load };
+        let at = Moment { stage: number + 1, time: self.run.state.time, load: self.run.state.load };
         unless_interrupted(at).and(result)
     }
 
@@ -111,7 +72,7 @@ impl<'o> Run<'o> {
             StageWork::Dynamic(steps) => carry_out(Dynamics::new(stage, steps)),
         }?;
         run.hand_over();
-        self.schedule.end_stage(&self.model, &self.state);
+        self.run.schedule.end_stage(&self.model, &self.run.state);
         Ok(())
     }
 
@@ -119,11 +80,11 @@ impl<'o> Run<'o> {
     fn open_stage(&mut self, number: usize) -> Result<StageRun<'_>, Failure> {
         self.offer_checkpoint(number)?;
         let stage = &self.plan.stages[number];
-        let fresh = number == 0 || self.schedule.has_fresh_loads(&self.model, number);
-        let begun = self.schedule.begin_stage(&self.model, number, stage.work.kind(), &self.state);
+        let fresh = number == 0 || self.run.schedule.has_fresh_loads(&self.model, number);
+        let begun = self.run.schedule.begin_stage(&self.model, number, stage.work.kind(), &self.run.state);
         let dof_map = begun.map_err(|error| describe(error, &self.model, number))?;
-        let fading = !self.state.fading.is_empty();
-        if let Some(error) = lacking(&self.model, &self.schedule, stage, number, fading, || Some(dof_map.clone())) {
+        let fading = !self.run.state.fading.is_empty();
+        if let Some(error) = lacking(&self.model, &self.run.schedule, stage, number, fading, || Some(dof_map.clone())) {
             return Err(describe(error, &self.model, number));
         }
         let mut run = self.stage_run(number, dof_map, fresh)?;
@@ -134,7 +95,7 @@ impl<'o> Run<'o> {
     /// Opens a stage where a checkpoint has left it.
     fn open_stage_again(&mut self, number: usize, begun: StageCheckpoint) -> Result<StageRun<'_>, Failure> {
         let plane = self.model.plane.filter(|_| begun.is_planar);
-        let dof_map = self.schedule.dof_map(&self.model, plane);
+        let dof_map = self.run.schedule.dof_map(&self.model, plane);
         let dof_map = dof_map.map_err(|error| describe(error, &self.model, number))?;
         let mut run = self.stage_run(number, dof_map, begun.fresh)?;
         run.take_up(begun)?;
@@ -147,21 +108,22 @@ impl<'o> Run<'o> {
         let plane = dof_map.plane().copied();
         let assembly = Assembly::new(&stage.context(number), dof_map, &self.model);
         let newton = newton_for(stage, &assembly, &self.model)?;
+        let RunState { schedule, state, good, counters, issued, bookkeeper, past } = &mut self.run;
         Ok(StageRun {
             keeps_account: self.plan.energy,
             plan: &self.plan,
             number,
             model: &self.model,
             charted: self.model.charted(stage.work.kind()),
-            schedule: &mut self.schedule,
-            state: &mut self.state,
-            good: &mut self.good,
+            schedule,
+            state,
+            good,
             observer: &mut *self.observer,
-            cutbacks_before: self.counters.cutbacks,
-            counters: &mut self.counters,
-            issued: &mut self.issued,
-            bookkeeper: &mut self.bookkeeper,
-            past: &mut self.past,
+            cutbacks_before: counters.cutbacks,
+            counters,
+            issued,
+            bookkeeper,
+            past,
             assembly,
             newton,
             plane,
@@ -176,22 +138,12 @@ impl<'o> Run<'o> {
 
     /// Shows the observer a checkpoint before the start of a stage, if it wants one.
     fn offer_checkpoint(&mut self, number: usize) -> Result<(), Failure> {
-        let at = Moment { stage: number + 1, time: self.state.time, load: self.state.load };
+        let at = Moment { stage: number + 1, time: self.run.state.time, load: self.run.state.load };
         unless_interrupted(at)?;
         if !self.observer.wants_checkpoint() {
             return Ok(());
         }
-        self.observer.checkpoint(&Checkpoint {
-            number,
-            schedule: self.schedule.clone(),
-            state: self.state.clone(),
-            good: self.good.clone(),
-            counters: self.counters.clone(),
-            issued: self.issued.clone(),
-            bookkeeper: self.bookkeeper.clone(),
-            past: self.past.clone(),
-            stage: None,
-        })
+        self.observer.checkpoint(&Checkpoint { number, run: self.run.clone(), stage: None })
     }
 }
 

@@ -533,7 +533,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
         let view = I::see(self.member(), at);
         let free = self.free_amplitude(at);
-        let (du, dp) = self.connection.variations_in_one_chart(at, &|slot| dq[slot as usize]);
+        let (du, dp) = self.connection.variations_in_one_chart(at, |slot| dq[slot as usize]);
         let stresses = view.extrapolated(&self.points(), free, &du, &dp);
         out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = packed(stress));
     }
