@@ -1,7 +1,7 @@
 //! Files that a command is about to write: none that this program did not write is replaced.
 
 use super::error::CommandError;
-use crate::output::{OutputError, OutputKind, ResultFolder, may_replace, remove_dead_parts};
+use crate::output::{OutputKind, ResultFolder, may_replace, refuse_no_folder, remove_dead_parts};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -30,14 +30,7 @@ fn is_forced() -> bool {
 /// Refuses a folder of results that is none, or has something else in the place of its files, and
 /// removes what dead processes have left half-written. The folder need not exist.
 pub fn check_folder(folder: &Path, files: &[(&str, OutputKind)]) -> Result<(), CommandError> {
-    match std::fs::metadata(folder) {
-        Ok(found) if !found.is_dir() => {
-            let reason = "is no folder: results are written into a folder".into();
-            return Err(OutputError::Occupied { path: folder.into(), reason }.into());
-        }
-        // Errors are met again, and told, where the folder is made.
-        Ok(_) | Err(_) => {}
-    }
+    refuse_no_folder(folder)?;
     remove_dead_parts(folder);
     files.iter().try_for_each(|(name, kind)| check_file(&folder.join(name), *kind))
 }

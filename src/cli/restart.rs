@@ -3,7 +3,7 @@
 use super::console;
 use super::error::CommandError;
 use super::simulate::Target;
-use crate::output::{Found, ResultFolder};
+use crate::output::{FoundCheckpoint, ResultFolder};
 use crate::scene::Scene;
 use std::time::Duration;
 
@@ -35,14 +35,14 @@ impl RestartArguments {
         }
         let place = folder.path().display().to_string();
         let refuse = |why: String| Err(CommandError::Checkpoint(why));
-        match Found::read(scene, folder.path())? {
-            Found::Nothing => {
+        match FoundCheckpoint::read(scene, folder.path())? {
+            FoundCheckpoint::Nothing => {
                 if self.resume {
                     console::note(&format!("{name}: {place} has no checkpoint: the run begins at its start"));
                 }
                 Ok(Target { folder, saved: None, interval })
             }
-            Found::Own(saved) if self.resume => {
+            FoundCheckpoint::Own(saved) if self.resume => {
                 let time = saved.run.time();
                 if let Some(end) = scene.plan.stages[saved.run.stage()].work.end().filter(|&end| end < time) {
                     return refuse(format!(
@@ -53,11 +53,11 @@ impl RestartArguments {
                 console::note(&format!("{name}: goes on after {} steps and levels", saved.run.steps()));
                 Ok(Target { folder, saved: Some(saved), interval })
             }
-            Found::Own(_) => refuse(format!(
+            FoundCheckpoint::Own(_) => refuse(format!(
                 "{place} has the checkpoint of a run of this deck that was stopped: add --resume to go on with it, or \
                  --fresh to begin anew"
             )),
-            Found::Other(why) => refuse(format!(
+            FoundCheckpoint::Other(why) => refuse(format!(
                 "{place} has the checkpoint of a run that was stopped, but {why}: add --fresh to drop it and begin \
                  anew, or give another folder with --out"
             )),

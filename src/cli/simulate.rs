@@ -148,7 +148,7 @@ struct Results {
     /// The time between checkpoints, if any are written
     interval: Option<Duration>,
     /// When the last checkpoint was written, or the run began
-    kept: Instant,
+    last_checkpoint: Instant,
     /// There are rows or results behind the last checkpoint.
     has_news: bool,
     /// The names of the files that are complete
@@ -168,43 +168,47 @@ impl Results {
             folder.reserve(RESERVED)?;
             let history = HistoryWriter::create(&folder, names, bars)?;
             let fields = scene.vtk.then(|| FieldsWriter::create(&folder, scene.figure(), timed)).transpose()?;
-            let files = (history, fields, ModesWriter::default());
-            return Ok((Self::with(folder, files, RowCounter::new(rows), interval, 0), None));
+            let results = Self::new(folder, history, RowCounter::new(rows), interval);
+            return Ok((Self { fields, ..results }, None));
         };
         let SavedRun { resumed, rows: seen, history, modes, fields, reel: _, bars: _, run } = *saved;
         folder.reserve(RESERVED)?;
         let history = HistoryWriter::resume(&folder, names, bars, history)?;
-        let fields = fields.map(|place| FieldsWriter::resume(&folder, scene.figure(), timed, place)).transpose()?;
-        let rows = RowCounter::after(rows, seen);
-        Ok((Self::with(folder, (history, fields, modes), rows, interval, resumed + 1), Some(run)))
+        let fields = fields.map(|saved| FieldsWriter::resume(&folder, scene.figure(), timed, saved)).transpose()?;
+        let results = Self::new(folder, history, RowCounter::after(rows, seen), interval);
+        Ok((Self { fields, modes, resumed: resumed + 1, ..results }, Some(run)))
     }
 
-    fn with(
-        folder: ResultFolder,
-        files: (HistoryWriter, Option<FieldsWriter>, ModesWriter),
-        rows: RowCounter,
-        interval: Option<Duration>,
-        resumed: u32,
-    ) -> Self {
-        let (history, fields, modes) = files;
-        let (kept, names) = (Instant::now(), Vec::new());
-        Self { folder, history, fields, modes, rows, resumed, interval, kept, has_news: false, names }
+    /// The results of a run with a history alone, which was not resumed.
+    fn new(folder: ResultFolder, history: HistoryWriter, rows: RowCounter, interval: Option<Duration>) -> Self {
+        Self {
+            folder,
+            history,
+            fields: None,
+            modes: ModesWriter::default(),
+            rows,
+            resumed: 0,
+            interval,
+            last_checkpoint: Instant::now(),
+            has_news: false,
+            names: Vec::new(),
+        }
     }
 
     /// Writes a checkpoint.
-    fn keep(&mut self, scene: &Scene, film: Option<&Film>, run: &Checkpoint) -> Result<(), OutputError> {
+    fn write_checkpoint(&mut self, scene: &Scene, film: Option<&Film>, run: &Checkpoint) -> Result<(), OutputError> {
         let saved = SavedRun {
             resumed: self.resumed,
             rows: self.rows.seen(),
-            history: self.history.place()?,
+            history: self.history.save()?,
             modes: self.modes.clone(),
-            fields: self.fields.as_mut().map(FieldsWriter::place).transpose()?,
+            fields: self.fields.as_mut().map(FieldsWriter::save).transpose()?,
             reel: film.map(|film| film.reel().clone()),
-            bars: self.history.side_columns().map(SideColumns::place),
+            bars: self.history.side_columns().map(SideColumns::save),
             run,
         };
         saved.write(scene, &self.folder)?;
-        (self.kept, self.has_news) = (Instant::now(), false);
+        (self.last_checkpoint, self.has_news) = (Instant::now(), false);
         Ok(())
     }
 
@@ -311,16 +315,16 @@ impl Observer for Watcher<'_> {
     }
 
     fn wants_checkpoint(&mut self) -> bool {
-        let Some(Results { interval: Some(interval), kept, has_news: true, .. }) = &self.results else {
+        let Some(Results { interval: Some(interval), last_checkpoint, has_news: true, .. }) = &self.results else {
             return false;
         };
-        kept.elapsed() >= *interval || signals::caught().is_some()
+        last_checkpoint.elapsed() >= *interval || signals::caught().is_some()
     }
 
     fn checkpoint(&mut self, checkpoint: &Checkpoint) -> Result<(), Failure> {
         let Self { results, scene, film, .. } = self;
         let Some(results) = results else { return Ok(()) };
-        results.keep(scene, film.as_ref(), checkpoint).map_err(io_failure)
+        results.write_checkpoint(scene, film.as_ref(), checkpoint).map_err(io_failure)
     }
 
     fn warn(&mut self, warning: &Warning) {

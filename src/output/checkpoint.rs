@@ -5,8 +5,8 @@
 //! other versions.
 
 use super::folder::CHECKPOINT;
-use super::history::HistoryPlace;
-use super::{BarsPlace, FieldsPlace, ModesWriter, OutputError, Reel, ResultFolder};
+use super::history::SavedHistory;
+use super::{ModesWriter, OutputError, Reel, ResultFolder, SavedBars, SavedFields};
 use crate::scene::Scene;
 use beamsim_core::run::Checkpoint;
 use serde::{Deserialize, Serialize};
@@ -42,21 +42,21 @@ pub struct SavedRun<R> {
     /// Converged states so far
     pub rows: u64,
     /// The rows of the history that are written
-    pub history: HistoryPlace,
+    pub history: SavedHistory,
     /// Modes and critical loads so far
     pub modes: ModesWriter,
     /// The fields that are written
-    pub fields: Option<FieldsPlace>,
+    pub fields: Option<SavedFields>,
     /// The shapes for the report so far
     pub reel: Option<Reel>,
     /// The error bars so far
-    pub bars: Option<BarsPlace>,
+    pub bars: Option<SavedBars>,
     /// The run
     pub run: R,
 }
 
 /// A checkpoint that was found in a folder of results.
-pub enum Found {
+pub enum FoundCheckpoint {
     /// There is none.
     Nothing,
     /// One of this deck and program
@@ -81,7 +81,7 @@ impl SavedRun<&Checkpoint> {
     }
 }
 
-impl Found {
+impl FoundCheckpoint {
     /// The checkpoint in a folder, as one of this scene.
     pub fn read(scene: &Scene, folder: &Path) -> Result<Self, OutputError> {
         let path = folder.join(CHECKPOINT);

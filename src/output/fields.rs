@@ -30,7 +30,7 @@ struct FieldFile {
 
 /// Fields as far as they are written.
 #[derive(Deserialize, Serialize)]
-pub struct FieldsPlace {
+pub struct SavedFields {
     written: Vec<FieldFile>,
     /// A row that is written only if no other follows
     pending: Option<PendingRow>,
@@ -70,12 +70,12 @@ impl FieldsWriter {
     }
 
     /// Opens the fields of a run that is resumed.
-    pub fn resume(folder: &ResultFolder, figure: Figure, timed: bool, place: FieldsPlace) -> Result<Self, OutputError> {
+    pub fn resume(folder: &ResultFolder, figure: Figure, timed: bool, saved: SavedFields) -> Result<Self, OutputError> {
         let part = folder.part(FIELDS);
         if !part.exists() {
             folder.reopen(PARTIAL_FIELDS, FIELDS)?;
         }
-        let FieldsPlace { written, pending } = place;
+        let SavedFields { written, pending } = saved;
         let own = |name: &OsStr| written.iter().any(|file| name == file.name.as_str());
         let wrong = |error| OutputError::file(&part, error);
         for entry in fs::read_dir(&part).map_err(wrong)? {
@@ -88,14 +88,14 @@ impl FieldsWriter {
     }
 
     /// Makes the files so far safe on the disk, and tells what it takes to go on behind them.
-    pub fn place(&mut self) -> Result<FieldsPlace, OutputError> {
+    pub fn save(&mut self) -> Result<SavedFields, OutputError> {
         for file in &self.written[self.safe..] {
             let path = self.part.join(&file.name);
             let synced = File::open(&path).and_then(|file| file.sync_all());
             synced.map_err(|error| OutputError::file(&path, error))?;
         }
         self.safe = self.written.len();
-        Ok(FieldsPlace { written: self.written.clone(), pending: self.pending.clone() })
+        Ok(SavedFields { written: self.written.clone(), pending: self.pending.clone() })
     }
 
     /// Takes a converged state, and writes it if its row is wanted.
@@ -126,7 +126,7 @@ impl FieldsWriter {
         if let Some(PendingRow { moment, state, origin }) = self.pending.take() {
             self.write(moment, &state, origin.as_ref())?;
         }
-        self.place()?;
+        self.save()?;
         let (name, index_name) = if finished { (FIELDS, "fields.pvd") } else { (PARTIAL_FIELDS, "fields.partial.pvd") };
         folder.write(index_name, index(name, &self.written).as_bytes())?;
         Ok(index_name)

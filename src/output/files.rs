@@ -49,7 +49,7 @@ impl PartFile {
     pub fn written(folder: &Path, name: &str, content: &[u8]) -> Result<(Self, File), OutputError> {
         let (part, mut file) = Self::create(folder, name)?;
         file.write_all(content).map_err(|error| {
-            // Half a file helps nobody.
+            // A file that is half written is of no use.
             let _ = fs::remove_file(&part.part);
             OutputError::file(&part.part, error)
         })?;
@@ -100,7 +100,7 @@ pub fn is_at(_: &File, _: &Path) -> bool {
 }
 
 /// Removes the incomplete files that dead processes have left in a folder: those that nobody has
-/// locked. What cannot be removed harms nobody.
+/// locked. It is no error if one cannot be removed.
 pub fn remove_dead_parts(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();

@@ -8,7 +8,7 @@
 
 use super::files::{FIELDS, PARTIAL_FIELDS, is_at, remove_dead_parts};
 use super::record::{FileRecord, Record};
-use super::{OutputError, OutputKind, may_replace, remove_fields, remove_if_there};
+use super::{OutputError, OutputKind, may_replace, refuse_no_folder, remove_fields, remove_if_there};
 use std::fs::{self, File, TryLockError};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -52,15 +52,12 @@ impl ResultFolder {
     /// Claims a folder, which is created where it is missing. Fails where another run writes to it,
     /// or where something is in the way of the results. With `force` plain files of others are not.
     pub fn claim(path: &Path, force: bool) -> Result<Self, OutputError> {
+        refuse_no_folder(path)?;
         let is_new = !path.exists();
-        if !is_new && !path.is_dir() {
-            let reason = "is no folder: results are written into a folder".into();
-            return Err(OutputError::Occupied { path: path.into(), reason });
-        }
         let folder = Self { path: path.into(), is_new, lock: lock(path)? };
         folder.refuse_obstacles(force)?;
         complete(path)?;
-        // Half a checkpoint serves nobody: the whole one before it is still there.
+        // A checkpoint that is half written is of no use; the whole one before it is still there.
         remove_if_there(path, &part(CHECKPOINT))?;
         Ok(folder)
     }
@@ -76,7 +73,7 @@ impl ResultFolder {
         for name in tables().chain([RECORD, CHECKPOINT]).chain(INDICES) {
             remove_if_there(&self.path, &part(name))?;
         }
-        let fields = self.path.join(part(FIELDS));
+        let fields = self.part(FIELDS);
         if fields.is_dir() {
             fs::remove_dir_all(&fields).map_err(|error| OutputError::file(&fields, error))?;
         }
@@ -86,14 +83,15 @@ impl ResultFolder {
     /// Takes space for a file that is written at the end, so that a disk that fills up meanwhile has
     /// room for it.
     pub fn reserve(&self, bytes: usize) -> Result<(), OutputError> {
-        self.write(RECORD, &vec![b' '; bytes])
+        let written = self.create(RECORD)?.write_all(&vec![b' '; bytes]);
+        written.map_err(|error| OutputError::file(&self.part(RECORD), error))
     }
 
     /// Creates a file, which gets its name with the others.
     pub fn create(&self, name: &str) -> Result<File, OutputError> {
-        let path = self.path.join(part(name));
+        let path = self.part(name);
         remove_if_there(&self.path, &part(name))?;
-        // What exists is neither opened nor followed.
+        // A file or link that someone has put there is an error.
         File::create_new(&path).map_err(|error| OutputError::file(&path, error))
     }
 
@@ -101,14 +99,13 @@ impl ResultFolder {
     pub fn write(&self, name: &str, content: &[u8]) -> Result<(), OutputError> {
         let mut file = self.create(name)?;
         let written = file.write_all(content).and_then(|()| file.sync_all());
-        written.map_err(|error| OutputError::file(&self.path.join(part(name)), error))
+        written.map_err(|error| OutputError::file(&self.part(name), error))
     }
 
     /// Writes a whole file, which replaces the one of its name at once.
     pub fn replace(&self, name: &str, content: &[u8]) -> Result<(), OutputError> {
         self.write(name, content)?;
-        let path = self.path.join(name);
-        fs::rename(self.path.join(part(name)), &path).map_err(|error| OutputError::file(&path, error))?;
+        rename_part(&self.path, name, name)?;
         sync(&self.path);
         Ok(())
     }
@@ -118,10 +115,9 @@ impl ResultFolder {
         self.path.join(part(name))
     }
 
-    /// Gives an incomplete file another name to come to.
+    /// Renames an incomplete file, which gets another name in the end.
     pub fn rename_part(&self, from: &str, to: &str) -> Result<(), OutputError> {
-        let to = self.part(to);
-        fs::rename(self.part(from), &to).map_err(|error| OutputError::file(&to, error))
+        rename_part(&self.path, from, &part(to))
     }
 
     /// Makes a complete file, or a folder, incomplete again.
@@ -135,7 +131,7 @@ impl ResultFolder {
         record.files = names.iter().map(|name| self.listed(name)).collect::<Result<_, _>>()?;
         self.write_over(RECORD, record.to_string().as_bytes())?;
         sync(&self.path);
-        complete(&self.path)
+        give_names(&self.path, record)
     }
 
     /// Writes a whole file over the space that was taken for it.
@@ -200,11 +196,11 @@ impl ResultFolder {
 impl Drop for ResultFolder {
     fn drop(&mut self) {
         if self.lock.is_some() {
-            // A lock that stays behind is nobody's: the next run takes it.
+            // If it stays, the next run locks it again.
             let _ = fs::remove_file(self.path.join(LOCK));
         }
         if self.is_new {
-            // Only an empty folder can be removed.
+            // This fails, as it should, if the folder has files.
             let _ = fs::remove_dir(&self.path);
         }
     }
@@ -252,42 +248,49 @@ fn refuse_obstacle(path: &Path) -> Result<(), OutputError> {
     }
 }
 
-/// Completes a commit that was cut short: the names of the files that a complete record lists.
-fn complete(folder: &Path) -> Result<(), OutputError> {
-    let rename = |from: String, to: &str| {
-        let path = folder.join(to);
-        fs::rename(folder.join(from), &path).map_err(|error| OutputError::file(&path, error))
-    };
-    let is_complete = |record: &Record| record.files.iter().all(|file| is_whole(folder, file));
-    if let Some(record) = Record::read_from(&folder.join(part(RECORD))).ok().filter(is_complete) {
-        tables().try_for_each(|name| remove_if_there(folder, name))?;
-        remove_if_there(folder, "report.html")?;
-        remove_fields(folder)?;
-        if !record.may_be_resumed() {
-            remove_if_there(folder, CHECKPOINT)?;
-        }
-        rename(part(RECORD), RECORD)?;
+/// Replaces the files of the run before by those of a complete record.
+fn give_names(folder: &Path, record: &Record) -> Result<(), OutputError> {
+    tables().try_for_each(|name| remove_if_there(folder, name))?;
+    remove_if_there(folder, "report.html")?;
+    remove_fields(folder)?;
+    if !record.may_be_resumed() {
+        remove_if_there(folder, CHECKPOINT)?;
     }
-    let Ok(record) = Record::read(folder) else { return Ok(()) };
-    // A record of a stranger names no other files.
-    let is_result = |file: &&FileRecord| tables().chain(INDICES).any(|name| name == file.name);
-    for file in record.files.iter().filter(is_result) {
-        let name = &file.name;
-        if folder.join(name).exists() || !is_whole(folder, file) {
-            continue;
-        }
-        if let Some(fields) = name.strip_suffix(".pvd").filter(|_| folder.join(part(FIELDS)).is_dir()) {
-            rename(part(FIELDS), fields)?;
-        }
-        rename(part(name), name)?;
-    }
+    rename_part(folder, RECORD, RECORD)?;
+    record.files.iter().try_for_each(|file| give_name(folder, &file.name))?;
     sync(folder);
     Ok(())
 }
 
-/// True if a file of a record is there under its temporary name, and complete.
+/// Gives a file its name; the index of fields is preceded by their folder.
+fn give_name(folder: &Path, name: &str) -> Result<(), OutputError> {
+    if let Some(fields) = name.strip_suffix(".pvd").filter(|_| folder.join(part(FIELDS)).is_dir()) {
+        rename_part(folder, FIELDS, fields)?;
+    }
+    rename_part(folder, name, name)
+}
+
+fn rename_part(folder: &Path, from: &str, to: &str) -> Result<(), OutputError> {
+    let path = folder.join(to);
+    fs::rename(folder.join(part(from)), &path).map_err(|error| OutputError::file(&path, error))
+}
+
+/// Completes a commit that was cut short, before or after the record got its name.
+fn complete(folder: &Path) -> Result<(), OutputError> {
+    let begun = Record::read_from(&folder.join(part(RECORD)));
+    if let Some(record) = begun.ok().filter(|record| record.files.iter().all(|file| is_whole(folder, file))) {
+        return give_names(folder, &record);
+    }
+    let Ok(record) = Record::read(folder) else { return Ok(()) };
+    let is_open = |file: &&FileRecord| !folder.join(&file.name).exists() && is_whole(folder, file);
+    record.files.iter().filter(is_open).try_for_each(|file| give_name(folder, &file.name))
+}
+
+/// True if a file of a record is there under its temporary name, and complete. A record from
+/// elsewhere may name other files than those of a run: none of them is.
 fn is_whole(folder: &Path, file: &FileRecord) -> bool {
-    FileRecord::of(&file.name, &folder.join(part(&file.name))).is_ok_and(|found| found == *file)
+    tables().chain(INDICES).any(|name| name == file.name)
+        && FileRecord::of(&file.name, &folder.join(part(&file.name))).is_ok_and(|found| found == *file)
 }
 
 /// Completes in a folder what a run that was killed has left half-named, unless a run is at work.

@@ -99,14 +99,14 @@ pub trait SideColumns: Send {
     /// The additional numbers of the rows that are held back, as far as they are known
     fn numbers(&self) -> Vec<f64>;
     /// What it takes to go on behind the rows so far
-    fn place(&self) -> BarsPlace;
+    fn save(&self) -> SavedBars;
 }
 
 /// Error bars as far as they are known, with the runs that they come from.
 #[derive(Clone, Debug, Deserialize, Serialize)]
-pub struct BarsPlace {
+pub struct SavedBars {
     /// The runs that the history is compared with
-    pub companions: Vec<CompanionPlace>,
+    pub companions: Vec<SavedCompanion>,
     /// The largest estimates so far, for each companion and column
     pub largest: Vec<Vec<f64>>,
     /// The largest value so far of each column's kind
@@ -115,7 +115,7 @@ pub struct BarsPlace {
 
 /// A run that a history is compared with.
 #[derive(Clone, Debug, Deserialize, Serialize)]
-pub struct CompanionPlace {
+pub struct SavedCompanion {
     /// The moment of each row
     pub moments: Vec<Moment>,
     /// The columns of the history, row by row
@@ -128,7 +128,7 @@ pub struct CompanionPlace {
 
 /// A history as far as it is written.
 #[derive(Deserialize, Serialize)]
-pub struct HistoryPlace {
+pub struct SavedHistory {
     /// The length of the file
     bytes: u64,
     /// XXH3 of 64 bits of the file
@@ -197,7 +197,7 @@ impl HistoryWriter {
         folder: &ResultFolder,
         names: Vec<String>,
         side_columns: Option<Box<dyn SideColumns>>,
-        place: HistoryPlace,
+        saved: SavedHistory,
     ) -> Result<Self, OutputError> {
         if !folder.part(HISTORY).exists() {
             // The run was stopped, or killed while it gave its files their names.
@@ -213,28 +213,28 @@ impl HistoryWriter {
         let path = folder.part(HISTORY);
         let wrong = |error| OutputError::file(&path, error);
         let mut file = File::options().read(true).write(true).open(&path).map_err(wrong)?;
-        let hasher = hash_of(&mut file, place.bytes).map_err(wrong)?;
-        if hasher.digest() != place.checksum {
+        let hasher = hash_of(&mut file, saved.bytes).map_err(wrong)?;
+        if hasher.digest() != saved.checksum {
             let reason = "was changed since its checkpoint was written: use --fresh to begin anew";
             return Err(OutputError::content(&path, reason));
         }
-        file.set_len(place.bytes).and_then(|()| file.seek(SeekFrom::End(0))).map_err(wrong)?;
+        file.set_len(saved.bytes).and_then(|()| file.seek(SeekFrom::End(0))).map_err(wrong)?;
         let file = RowFile { hasher, ..RowFile::new(file) };
         let mut writer = Self::with(path, csv::Writer::from_writer(file), names, side_columns);
-        writer.pending = place.pending.is_some();
-        writer.record = place.pending.unwrap_or_default().into();
-        writer.held_back = place.held_back.into_iter().map(csv::ByteRecord::from).collect();
+        writer.pending = saved.pending.is_some();
+        writer.record = saved.pending.unwrap_or_default().into();
+        writer.held_back = saved.held_back.into_iter().map(csv::ByteRecord::from).collect();
         Ok(writer)
     }
 
     /// Makes the rows so far safe on the disk, and tells what it takes to go on behind them.
-    pub fn place(&mut self) -> Result<HistoryPlace, OutputError> {
+    pub fn save(&mut self) -> Result<SavedHistory, OutputError> {
         self.writer.flush()?;
         let file = &self.writer.get_ref().file;
         file.sync_all()?;
         let fields =
             |record: &csv::ByteRecord| record.iter().map(|f| String::from_utf8_lossy(f).into_owned()).collect();
-        Ok(HistoryPlace {
+        Ok(SavedHistory {
             bytes: file.metadata()?.len(),
             checksum: self.writer.get_ref().hasher.digest(),
             pending: self.pending.then(|| fields(&self.record)),

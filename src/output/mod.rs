@@ -17,16 +17,16 @@ mod record;
 mod report;
 
 pub use cells::harmless;
-pub use checkpoint::{Found, SavedRun};
+pub use checkpoint::{FoundCheckpoint, SavedRun};
 pub use error::OutputError;
-pub use fields::{FieldsPlace, FieldsWriter};
+pub use fields::{FieldsWriter, SavedFields};
 pub use files::{PartFile, remove_dead_parts, remove_fields, remove_if_there};
 pub use folder::{ResultFolder, settle};
 pub use history::{
-    BarsPlace, CompanionPlace, HistoryPlace, HistoryReader, HistoryWriter, Row, RowCounter, Rows, SideColumns,
+    HistoryReader, HistoryWriter, Row, RowCounter, Rows, SavedBars, SavedCompanion, SavedHistory, SideColumns,
 };
 pub use modes::ModesWriter;
-pub use ownership::{OutputKind, may_replace};
+pub use ownership::{OutputKind, may_replace, refuse_no_folder};
 pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale};
 pub use quantities::{Units, quantity_of};
 pub use record::{

@@ -105,6 +105,16 @@ pub fn may_replace(path: &Path, kind: OutputKind, force: bool) -> Result<(), Out
     refuse("exists, and beamsim did not write it: choose another name, or replace it by --force")
 }
 
+/// Refuses a path for a folder of results at which something else stands. It need not exist.
+pub fn refuse_no_folder(path: &Path) -> Result<(), OutputError> {
+    // Other errors are met again, and told, where the folder is made.
+    if fs::metadata(path).is_ok_and(|found| !found.is_dir()) {
+        let reason = "is no folder: results are written into a folder".into();
+        return Err(OutputError::Occupied { path: path.into(), reason });
+    }
+    Ok(())
+}
+
 /// The reason why a file with the name of a deck is never written as something else.
 fn deck(path: &Path) -> Option<&'static str> {
     let is_deck = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));

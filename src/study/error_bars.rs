@@ -10,7 +10,7 @@ use super::accuracy::{divisor_in_time, divisors_in_space, left_by_newton};
 use super::cost::{Companion, Family, Mesher, Original, Pace, Patience, Sampler, Variant, dynamic_stages, trial};
 use super::outcome::{Outcome, Presence, StageClock};
 use crate::deck::{Deck, Diagnostic, Path, PointRef, Spanned, StageBody};
-use crate::output::{BarsPlace, CompanionPlace, SideColumns};
+use crate::output::{SavedBars, SavedCompanion, SideColumns};
 use crate::scene::Scene;
 use beamsim_core::run::Failure;
 use beamsim_core::tensor::Vec3;
@@ -228,9 +228,9 @@ pub fn refuse_paths(deck: &Deck) -> Result<(), Diagnostic> {
 
 impl ErrorBars {
     /// Error bars that go on from a checkpoint.
-    pub fn resume(deck: &Deck, scene: &Scene, place: BarsPlace) -> Self {
-        let BarsPlace { companions, largest, values } = place;
-        let companion = |CompanionPlace { moments, rows, divisors, next }: CompanionPlace| CompanionRun {
+    pub fn resume(deck: &Deck, scene: &Scene, saved: SavedBars) -> Self {
+        let SavedBars { companions, largest, values } = saved;
+        let companion = |SavedCompanion { moments, rows, divisors, next }: SavedCompanion| CompanionRun {
             outcome: Outcome::of_rows(scene, moments, rows),
             divisors,
             next,
@@ -276,12 +276,12 @@ impl SideColumns for ErrorBars {
         known
     }
 
-    fn place(&self) -> BarsPlace {
+    fn save(&self) -> SavedBars {
         let companion = |CompanionRun { outcome, divisors, next }: &CompanionRun| {
             let (moments, rows) = outcome.history().map(|(at, row)| (at, row.to_vec())).unzip();
-            CompanionPlace { moments, rows, divisors: divisors.clone(), next: *next }
+            SavedCompanion { moments, rows, divisors: divisors.clone(), next: *next }
         };
-        BarsPlace {
+        SavedBars {
             companions: self.companions.iter().map(companion).collect(),
             largest: self.largest.clone(),
             values: self.values.clone(),

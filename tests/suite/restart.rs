@@ -7,34 +7,8 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A pendulum of many steps: about half a second of work in a release build.
-const SWING: &str = r#"
-gravity = [0, 0, -9.81]
-[point]
-root = [0, 0, 0]
-tip = [1, 0, 0]
-[section.rod]
-EA = 1e5
-GA = 1e5
-GJ = 100
-EI = 100
-rhoA = 1
-rhoJ = [2e-4, 1e-4, 1e-4]
-[[beam]]
-name = "rod"
-through = ["root", "tip"]
-section = "rod"
-elements = 10
-[[support]]
-at = "root"
-fix = ["ux", "uy", "uz"]
-[[stage]]
-kind = "dynamic"
-end = 4
-step = 0.0005
-[output]
-nodes = ["tip"]
-"#;
+/// A pendulum of many steps.
+const SWING: &str = include_str!("../reliability/swing.toml");
 
 fn start(folder: &Folder, arguments: &[&str]) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_beamsim"));
