@@ -100,7 +100,7 @@ class Study:
 
     def kills_of_runs(self, kills, extra):
         """Runs over the results of an older run, killed and resumed until they end."""
-        for out, step in (("older", "0.002"), ("newer", "0.001")):
+        for out, step in (("older", "0.002"), ("newer", "0.0005")):
             self.whole(["run", "swing.toml", "-q", "--out", out, "--set", f"stage.0.step={step}", *extra])
         begun = time.time()
         self.whole(["run", "swing.toml", "-q", "--out", "timed", *extra])
