@@ -125,6 +125,8 @@ class Bench:
         """Instructions outside the functions that are left out, and iterations, of a run."""
         deck, out, counts = (self.folder / name for name in ("deck.toml", "out", "counts"))
         deck.write_text(text.format(steps=steps))
+        # The results of the run before would be read, to tell whose they are.
+        shutil.rmtree(out, ignore_errors=True)
         command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={counts}"]
         command += [str(self.program), "run", str(deck), "--out", str(out)]
         done = subprocess.run(command, capture_output=True, text=True, env=os.environ | NO_REPEATED_BYTES)
