@@ -53,6 +53,30 @@ pub fn inspect_files(root: &Path, paths: &[PathBuf]) -> ExitCode {
     ExitCode::SUCCESS
 }
 
+/// Times without an answer after which a worker hangs even if it does nothing.
+const MOST_SILENT_TIMES: usize = 12;
+
+/// A worker that has not answered for a while: it hangs, or other work has the processors.
+#[derive(Default)]
+struct Silence {
+    /// Number of times [`PATIENCE`] without an answer
+    times: usize,
+    /// Processor time of the worker at the last of them, in seconds
+    processor: Option<f64>,
+}
+
+impl Silence {
+    /// True if the worker may have had no processor since it was asked last; called after each
+    /// [`PATIENCE`] without an answer.
+    fn is_idle(&mut self, worker: &Child) -> bool {
+        let Some(now) = process::processor_seconds(worker) else { return false };
+        let is_busy = self.processor.is_some_and(|before| now - before > 0.5 * PATIENCE.as_secs_f64());
+        self.times += 1;
+        self.processor = Some(now);
+        !is_busy && self.times < MOST_SILENT_TIMES
+    }
+}
+
 /// Counts of a session.
 #[derive(Default)]
 struct Tally {
@@ -140,12 +164,15 @@ impl Session {
         while next < self.options.inputs && tally.faults.len() < MOST_FAULTS {
             let mut worker = self.worker(next)?;
             let lines = lines(&mut worker);
+            let mut silence = Silence::default();
             let timed_out = loop {
                 match lines.recv_timeout(PATIENCE) {
                     Ok(line) => {
                         self.take(&line, next, &mut tally);
                         next += self.options.jobs as u64;
+                        silence = Silence::default();
                     }
+                    Err(RecvTimeoutError::Timeout) if silence.is_idle(&worker) => {}
                     Err(RecvTimeoutError::Timeout) => break true,
                     Err(RecvTimeoutError::Disconnected) => break false,
                 }

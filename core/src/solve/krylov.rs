@@ -30,6 +30,8 @@ pub struct Spectrum {
     /// Coordinates of each eigenvector in the basis
     coordinates: Vec<Vec<Complex<f64>>>,
     space: KrylovSpace,
+    /// True if one eigenvalue was enough: the others may not have converged
+    pub(crate) was_enough: bool,
 }
 
 /// Size of the basis of a rough estimate of eigenvalues
@@ -41,6 +43,8 @@ const BLOCK_SIZE: usize = 6;
 const LONG_PROJECTION: usize = 100;
 /// Relative change of eigenvalues between two projections at which they have converged
 const EIGENVALUE_TOLERANCE: f64 = 1e-11;
+/// Relative change between two projections of an eigenvalue that is enough
+const ENOUGH_TOLERANCE: f64 = 1e-8;
 /// Vectors that orthogonalisation reduces to this part of their norm are linearly dependent on the
 /// basis.
 const DEPENDENT_NORM_RATIO: f64 = 1e-11;
@@ -48,20 +52,35 @@ const DEPENDENT_NORM_RATIO: f64 = 1e-11;
 /// The `wanted` eigenvalues of largest magnitude, descending; fewer if the space has fewer
 /// dimensions. `None` if an image cannot be computed, or after a request to stop.
 pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Spectrum> {
+    largest_eigenvalues_until(operator, wanted, &|_| false)
+}
+
+/// Like [`largest_eigenvalues`], but the search ends as soon as an eigenvalue has converged for
+/// which `is_enough`; the others may not have converged then.
+pub fn largest_eigenvalues_until(
+    operator: &mut dyn Operator,
+    wanted: usize,
+    is_enough: &dyn Fn(Complex<f64>) -> bool,
+) -> Option<Spectrum> {
     let most = operator.size().min(24 * wanted + 160);
-    eigenvalues_within(operator, wanted, most)
+    eigenvalues_within(operator, wanted, most, is_enough)
 }
 
 /// Rough estimates of the eigenvalues of largest magnitude from a few images. `None` if an image
 /// cannot be computed, or after a request to stop.
 pub fn roughly_largest_eigenvalues(operator: &mut dyn Operator) -> Option<Vec<Complex<f64>>> {
     let most = operator.size().min(ROUGH_BASIS_SIZE);
-    eigenvalues_within(operator, most, most).map(|spectrum| spectrum.values)
+    eigenvalues_within(operator, most, most, &|_| false).map(|spectrum| spectrum.values)
 }
 
-/// Eigenvalues from a basis of at most `most` vectors. `None` if an image cannot be computed, or
-/// after a request to stop.
-fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -> Option<Spectrum> {
+/// Eigenvalues from a basis of at most `most` vectors, see [`largest_eigenvalues_until`]. `None` if
+/// an image cannot be computed, or after a request to stop.
+fn eigenvalues_within(
+    operator: &mut dyn Operator,
+    wanted: usize,
+    most: usize,
+    is_enough: &dyn Fn(Complex<f64>) -> bool,
+) -> Option<Spectrum> {
     let size = operator.size();
     if size == 0 {
         return Some(Spectrum::default());
@@ -110,8 +129,12 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
         let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= EIGENVALUE_TOLERANCE * a.norm();
         let still =
             now.len() == last.len() && now.len() >= wanted.min(size) && now.iter().zip(&last).take(guard).all(same);
-        if still || space.basis.len() >= most {
-            return space.into_spectrum(operator.is_symmetric(), wanted);
+        let near = |a: &Complex<f64>, b: &Complex<f64>| (a - b).norm() <= ENOUGH_TOLERANCE * a.norm();
+        let suffices = now.iter().zip(&last).any(|(a, b)| near(a, b) && is_enough(*a));
+        if still || suffices || space.basis.len() >= most {
+            let was_enough = suffices && !still;
+            let spectrum = space.into_spectrum(operator.is_symmetric(), wanted)?;
+            return Some(Spectrum { was_enough, ..spectrum });
         }
         last = now;
     }
@@ -191,9 +214,8 @@ impl KrylovSpace {
         if self.basis.len() >= most {
             return;
         }
-        let size = |vector: &[f64], weighed: &[f64]| dot(vector, weighed).max(0.0).sqrt();
-        let mut weighed = operator.weigh(&vector);
-        let before = size(&vector, &weighed);
+        // The squared part of the vector along the basis
+        let mut squared = 0.0;
         // Two passes suffice (Kahan, Parlett).
         for _ in 0..2 {
             for (own, heavy) in self.basis.iter().zip(&self.weighed) {
@@ -201,12 +223,13 @@ impl KrylovSpace {
                     return;
                 }
                 let along = dot(heavy, &vector);
+                squared += along * along;
                 vector.iter_mut().zip(own).for_each(|(v, o)| *v -= along * o);
             }
         }
-        weighed = operator.weigh(&vector);
-        let length = size(&vector, &weighed);
-        if length.is_nan() || length <= DEPENDENT_NORM_RATIO * before {
+        let mut weighed = operator.weigh(&vector);
+        let length = dot(&vector, &weighed).max(0.0).sqrt();
+        if length.is_nan() || length <= DEPENDENT_NORM_RATIO * squared.sqrt() {
             return;
         }
         vector.iter_mut().for_each(|v| *v /= length);
@@ -261,7 +284,7 @@ impl KrylovSpace {
         pairs.sort_by(|a, b| largest_first(&a.0, &b.0));
         pairs.truncate(wanted);
         let (values, coordinates) = pairs.into_iter().unzip();
-        Some(Spectrum { values, coordinates, space: self })
+        Some(Spectrum { values, coordinates, space: self, was_enough: false })
     }
 }
 

@@ -33,6 +33,8 @@ pub struct LinearSolver {
     constraints: Option<Constraints>,
     /// Separate factorisation that counts negative pivots if this solver's own does not
     pub(super) pivots: Option<Pivots>,
+    /// Column of tiles in which a tangent was unsymmetric last, where the next one is looked at first
+    pub(super) unsymmetric_column: usize,
     /// Buffers, by equation: the solution, its right-hand side, and the residual
     right_hand_side: Vec<f64>,
     wanted: Vec<f64>,
@@ -115,6 +117,7 @@ impl LinearSolver {
             multipliers: multipliers.to_vec(),
             constraints,
             pivots: None,
+            unsymmetric_column: 0,
             right_hand_side: Vec::new(),
             wanted: Vec::new(),
             leftover: ResidualBuffer::default(),

@@ -1,6 +1,6 @@
 //! Small motions x exp(s t) with (s^2 M + s C + K) x = 0 nearest to a shift, each verified.
 
-use super::krylov::{Operator, Spectrum, largest_eigenvalues, roughly_largest_eigenvalues};
+use super::krylov::{Operator, Spectrum, largest_eigenvalues_until, roughly_largest_eigenvalues};
 use super::linear::LinearSolver;
 use super::pivots::is_symmetric;
 use super::softest::lost_part;
@@ -298,6 +298,12 @@ impl<'a> ModeSearch<'a> {
     /// The motions nearest to the shift factorised last, nearest first, without those that fail
     /// verification. `None` if a solution fails, or after a request to stop.
     pub fn nearest(&mut self, wanted: usize) -> Option<Vec<SmallMotion>> {
+        self.nearest_until(wanted, f64::INFINITY)
+    }
+
+    /// Like [`ModeSearch::nearest`], but the search ends as soon as a motion is found that grows by
+    /// more than the part `growth` of its |s|; others may be missing then.
+    pub fn nearest_until(&mut self, wanted: usize, growth: f64) -> Option<Vec<SmallMotion>> {
         let room = match self.form {
             ProblemForm::Symmetric | ProblemForm::Undamped => wanted,
             ProblemForm::Gyroscopic | ProblemForm::General => 2 * wanted + 2,
@@ -306,13 +312,19 @@ impl<'a> ModeSearch<'a> {
         let form = self.form;
         let diagonal = self.inner_product();
         let mut operator = ModeOperator { search: self, diagonal };
-        let spectrum = largest_eigenvalues(&mut operator, room)?;
+        let is_enough = |theta: Complex<f64>| {
+            let exponent = form.exponent(shift, theta);
+            // What hardly moves may be round-off.
+            exponent.re > growth * exponent.norm() && exponent.norm() > FREE_MOTION_RATIO * shift
+        };
+        let spectrum = largest_eigenvalues_until(&mut operator, room, &is_enough)?;
         let allowed = match form {
             ProblemForm::Symmetric => MAX_RESIDUAL_OF_SYMMETRIC,
             ProblemForm::Undamped | ProblemForm::Gyroscopic | ProblemForm::General => MAX_RESIDUAL,
         };
         let mut found = Vec::new();
-        for (number, &theta) in spectrum.values.iter().enumerate().filter(|(_, theta)| theta.norm() > 0.0) {
+        let compared = |theta: Complex<f64>| theta.norm() > 0.0 && (!spectrum.was_enough || is_enough(theta));
+        for (number, &theta) in spectrum.values.iter().enumerate().filter(|(_, theta)| compared(**theta)) {
             if interrupt::is_requested() {
                 return None;
             }
@@ -340,6 +352,11 @@ impl<'a> ModeSearch<'a> {
             let twin = twin.then(|| SmallMotion { exponent: -s.conj(), ..motion.clone() });
             motions.push(motion);
             motions.extend(twin);
+        }
+        let is_there = motions.iter().any(|motion| motion.exponent.re > growth * motion.exponent.norm());
+        if spectrum.was_enough && !is_there {
+            // The one that was enough has not been confirmed.
+            return if self.factorise(shift) { self.nearest(wanted) } else { None };
         }
         Some(motions)
     }

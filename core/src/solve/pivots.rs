@@ -4,6 +4,7 @@
 use super::block::BlockSolver;
 use super::constraints::Constraints;
 use crate::system::{Pattern, Slot, Symmetry, System};
+use std::cell::OnceCell;
 
 /// A factorisation L D L^T for counting negative pivots, beside a solver whose own factorisation
 /// does not tell them.
@@ -46,33 +47,41 @@ impl Pivots {
 
 /// True if each entry equals its mirror image. Tiles stored only once count as symmetric.
 pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
+    unsymmetric_column(pattern, values, 0).is_none()
+}
+
+/// The first column of tiles with an entry that differs from its mirror image, from column `first`
+/// on and then from the beginning. `None` if the tangent is symmetric.
+pub(super) fn unsymmetric_column(pattern: &Pattern, values: &[f64], first: usize) -> Option<usize> {
     if pattern.symmetry == Symmetry::Whole {
-        return true;
+        return None;
     }
     let width = pattern.width();
-    let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let entry = |tile: usize, r: usize, c: usize| values[pattern.storage.entry(tile, r, c)];
-    let root = |k: usize| match pattern.tile(k / width, k / width).map_or(0.0, |tile| entry(tile, k % width, k % width))
-    {
-        0.0 => largest.sqrt(),
+    let largest = OnceCell::new();
+    let diagonal = |column: usize, k: usize| pattern.tile(column, column).map_or(0.0, |tile| entry(tile, k, k));
+    let root = |column: usize, k: usize| match diagonal(column, k) {
+        0.0 => largest.get_or_init(|| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()))).sqrt(),
         diagonal => diagonal.abs().sqrt(),
     };
-    let roots: Vec<f64> = (0..width * pattern.node_blocks.count()).map(root).collect();
-    let roots: Vec<&[f64]> = roots.chunks_exact(width).collect();
-    (0..pattern.node_blocks.count()).all(|column| {
-        let beside = pattern.rows_of(column).iter().map(|&row| row as usize);
-        let beside = beside.filter(|&row| row > column && !pattern.symmetry.halves());
-        let rows = std::iter::once(column).chain(beside);
-        let mut pairs = rows.map(|row| (row, pattern.tile(row, column), pattern.tile(column, row)));
-        pairs.all(|(row, tile, mirror)| match (tile, mirror) {
-            (Some(tile), Some(mirror)) => (0..width * width).all(|k| {
+    let is_unsymmetric = |column: usize| {
+        let below = pattern.rows_of(column).iter().map(|&row| row as usize);
+        let below = below.filter(|&row| row > column && !pattern.symmetry.halves());
+        std::iter::once(column).chain(below).any(|row| {
+            let (Some(tile), Some(mirror)) = (pattern.tile(row, column), pattern.tile(column, row)) else {
+                // Every off-diagonal tile has a mirrored one.
+                return true;
+            };
+            (0..width * width).any(|k| {
                 let c = k / width;
                 let r = k % width;
-                let difference = entry(tile, r, c) - entry(mirror, c, r);
-                difference.abs() <= SYMMETRY_TOLERANCE * roots[column][c] * roots[row][r]
-            }),
-            // Every off-diagonal tile has a mirrored one.
-            (None, _) | (_, None) => false,
+                let difference = (entry(tile, r, c) - entry(mirror, c, r)).abs();
+                let allowed = || SYMMETRY_TOLERANCE * root(column, c) * root(row, r);
+                difference.is_nan() || (difference > 0.0 && difference > allowed())
+            })
         })
-    })
+    };
+    let count = pattern.node_blocks.count();
+    let first = first.min(count);
+    (first..count).chain(0..first).find(|&column| is_unsymmetric(column))
 }

@@ -2,7 +2,7 @@
 //! for any the sign of its determinant.
 
 use super::linear::LinearSolver;
-use super::pivots::{Pivots, is_symmetric};
+use super::pivots::{Pivots, unsymmetric_column};
 use super::tangent::Tangent;
 use crate::system::System;
 use serde::{Deserialize, Serialize};
@@ -81,7 +81,8 @@ impl LinearSolver {
     /// leaves this solver's last one unchanged. `None` if the tangent is unsymmetric, or the
     /// factorisation fails.
     pub(super) fn negative_beside(&mut self, system: &System) -> Option<usize> {
-        if !is_symmetric(&system.pattern, &system.values) {
+        if let Some(column) = unsymmetric_column(&system.pattern, &system.values, self.unsymmetric_column) {
+            self.unsymmetric_column = column;
             return None;
         }
         if self.pivots.is_none() {

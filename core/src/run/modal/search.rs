@@ -30,6 +30,15 @@ const GROWS: f64 = 1e-6;
 /// Motions slower than this part of the others tell nothing of their frequencies.
 const FREE: f64 = 1e-4;
 
+/// What a search is to find.
+#[derive(Clone, Copy)]
+pub struct Wanted {
+    /// Number of modes, slowest first
+    pub modes: usize,
+    /// Growth, as a part of |s|, of a motion that ends the search at once; infinite if all are wanted
+    pub enough: f64,
+}
+
 /// The modes of a stage, and what is known about them.
 #[derive(Default)]
 pub struct Found {
@@ -80,7 +89,7 @@ fn drop_multipliers(system: &System, model: &Model, values: &mut [f64]) {
 pub fn find_modes(
     search: &mut ModeSearch,
     mut shift: f64,
-    modes: usize,
+    wanted: Wanted,
     tell: &mut dyn FnMut(f64) -> Result<(), Failure>,
     work: &mut Work,
 ) -> Result<Option<Found>, Failure> {
@@ -96,7 +105,7 @@ pub fn find_modes(
         shift = SHIFT * lowest;
     }
     tell(0.5)?;
-    let found = timed(&mut work.solve_seconds, || find_all(search, shift, modes));
+    let found = timed(&mut work.solve_seconds, || find_all(search, shift, wanted));
     work.factorisations += search.factorisations;
     Ok(found)
 }
@@ -111,14 +120,18 @@ pub fn first_shift(matrices: &Matrices, system: &System) -> f64 {
 /// All modes that are asked for, and all unstable ones: where pivots count them, until they are
 /// complete; else among more than are asked for, and from shifts further out. `None` where a
 /// solution fails.
-fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> {
+fn find_all(search: &mut ModeSearch, shift: f64, wanted: Wanted) -> Option<Found> {
+    let Wanted { modes, enough } = wanted;
     let mut found = Found { rigid: search.rigid(), ..Found::default() };
     if !search.factorise(shift) {
         return None;
     }
     let Some(unstable) = search.growing() else {
         let is_held = search.is_held();
-        found.motions = search.nearest(modes + SPARE)?;
+        found.motions = search.nearest_until(modes + SPARE, enough)?;
+        if found.motions.iter().any(|motion| motion.exponent.re > enough * motion.exponent.norm()) {
+            return Some(found);
+        }
         let further = FURTHER.map(|times| times * shift);
         let unseen = further.into_iter().filter(|&further| !is_held && !search.reaches(&found.motions, further));
         for further in unseen.collect::<Vec<f64>>() {

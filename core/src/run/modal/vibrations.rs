@@ -8,15 +8,16 @@
 //! positive for large s. Without masses no more is known: for each K that is not symmetric there
 //! are masses with which something grows.
 
-use super::search::{find_modes, first_shift, grows, matrices};
+use super::search::{Wanted, find_modes, first_shift, grows, matrices};
 use crate::model::{Assembly, StageContext, StageKind};
 use crate::run::failure::Failure;
 use crate::run::results::Mode;
 use crate::run::stage_run::{StageRun, Teller};
 use crate::solve::{LinearSolver, ModeSearch, Signature, SmallMotion, Tangent};
 
-/// Modes that are looked for at least, slowest first.
-const MODES: usize = 8;
+/// Modes that are looked for at least, slowest first, unless one grows by more than a thousandth of
+/// its |s|, which is no round-off: it tells enough.
+const WANTED: Wanted = Wanted { modes: 8, enough: 1e-3 };
 
 /// Growth that is less than so many times what round-off may have taken of |s| is in doubt.
 const SURELY: f64 = 10.0;
@@ -31,7 +32,7 @@ pub(in crate::run) enum Vibrations {
     Counted(usize),
     /// None of those that were looked at grows.
     Bounded,
-    /// This one grows fastest.
+    /// This one grows, fastest of those that were found.
     Growing(Mode),
     /// Some grow, whatever masses there are.
     Diverging,
@@ -83,7 +84,7 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
     let shift = first_shift(&matrices, &assembly.system);
     let mut search = ModeSearch::new(&mut assembly.system, &mut solver, &matrices, Vec::new());
     // The stage itself lies behind.
-    let found = find_modes(&mut search, shift, MODES, &mut |_| teller.tell(1.0), &mut counters.work)?;
+    let found = find_modes(&mut search, shift, WANTED, &mut |_| teller.tell(1.0), &mut counters.work)?;
     Ok(found.map_or(Vibrations::Unknown, |found| judge(&found.motions)))
 }
 

@@ -61,19 +61,14 @@ fn unload(stage: &mut StageRun) {
     charts::freeze(state, &charted.elements);
 }
 
-/// The softest motion of the stiffness, which is formed.
+/// The softest motion of the stiffness, which is formed. It stays beside its factors: the signs of
+/// pivots at the start and the first correction need both.
 fn softest(stage: &mut StageRun) -> Option<SoftMode> {
-    let is_linear = stage.is_linear();
     let StageRun { assembly, newton, state, model, counters, number, .. } = stage;
     assembly.evaluate(state, Weights::STIFFNESS, None);
     counters.work.factorisations += 1;
-    if is_linear {
-        // What is linear is factorised once.
-        let mut tangent = Tangent::that_stays(assembly, state);
-        newton.solver.factorise_new(&mut tangent);
-        return SoftMode::find(&mut newton.solver, &mut tangent, model, *number > 0);
-    }
-    let mut tangent = Tangent::that_may_go(assembly, state, Weights::STIFFNESS);
+    let mut tangent = Tangent::that_stays(assembly, state);
+    newton.solver.factorise_new(&mut tangent);
     SoftMode::find(&mut newton.solver, &mut tangent, model, *number > 0)
 }
 
