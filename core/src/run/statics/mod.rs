@@ -23,6 +23,10 @@ use crate::model::charts;
 use crate::solve::{SoftMode, Tangent};
 use crate::warning::WarningKind;
 
+/// Values of the largest tangent that is kept beside its factors at the start of a stage, 80 MB:
+/// that saves a factorisation and an evaluation, and takes half as much memory again.
+const MOST_KEPT_VALUES: usize = 10_000_000;
+
 /// Puts the stage at rest, at load factor 0. What nothing holds as long as nothing is loaded is
 /// named: levels may bring what holds it.
 fn begin(stage: &mut StageRun, space: &mut SpatialLook) -> Result<Option<Failure>, Failure> {
@@ -61,14 +65,20 @@ fn unload(stage: &mut StageRun) {
     charts::freeze(state, &charted.elements);
 }
 
-/// The softest motion of the stiffness, which is formed. It stays beside its factors: the signs of
-/// pivots at the start and the first correction need both.
+/// The softest motion of the stiffness, which is formed. It stays beside its factors, since the
+/// signs of pivots at the start and the first correction need both, unless that takes much memory.
 fn softest(stage: &mut StageRun) -> Option<SoftMode> {
+    let stays = stage.is_linear() || stage.assembly.system.values.len() <= MOST_KEPT_VALUES;
     let StageRun { assembly, newton, state, model, counters, number, .. } = stage;
     assembly.evaluate(state, Weights::STIFFNESS, None);
     counters.work.factorisations += 1;
-    let mut tangent = Tangent::that_stays(assembly, state);
-    newton.solver.factorise_new(&mut tangent);
+    let mut tangent = if stays {
+        let mut tangent = Tangent::that_stays(assembly, state);
+        newton.solver.factorise_new(&mut tangent);
+        tangent
+    } else {
+        Tangent::that_may_go(assembly, state, Weights::STIFFNESS)
+    };
     SoftMode::find(&mut newton.solver, &mut tangent, model, *number > 0)
 }
 
