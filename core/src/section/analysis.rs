@@ -9,6 +9,7 @@ use super::properties::{Properties, load_about_origin, mass_centre, moved, moved
 use super::saint_venant::{Solution, solve};
 use super::stress::NodalStresses;
 use super::{Matrix6, Point, Vector6};
+use crate::interrupt;
 
 /// The aimed error of the stiffness where none is given
 pub const DEFAULT_AIM: f64 = 1e-3;
@@ -95,6 +96,9 @@ struct Computed {
 
 impl Computed {
     fn new(geometry: &Geometry, materials: &[Material], level: usize) -> Result<Self, SectionError> {
+        if interrupt::is_requested() {
+            return Err(SectionError::Interrupted);
+        }
         let mesh = geometry.mesh(level)?;
         let solution = solve(&mesh, materials)?;
         Ok(Self { level, mesh, solution })
@@ -115,7 +119,7 @@ impl Computed {
     fn estimate(&self, coarser: &Self) -> f64 {
         let refinement = REFINEMENT.powi((self.level - coarser.level) as i32);
         let difference = relative_difference(&coarser.solution.stiffness, &self.solution.stiffness);
-        difference / (refinement.powf(ASSUMED_ORDER) - 1.0)
+        difference / (libm::pow(refinement, ASSUMED_ORDER) - 1.0)
     }
 
     /// The most levels by which a finer mesh has no more than the largest number of nodes.
@@ -138,8 +142,8 @@ pub fn analyse(geometry: &Geometry, materials: &[Material], aim: MeshAim) -> Res
         let finer = Computed::new(geometry, materials, coarser.level + jump)?;
         let estimate = finer.estimate(&coarser);
         let wanted_jump = match aim {
-            MeshAim::Error(error) => (estimate / error).ln() / (PREDICTED_ORDER * REFINEMENT.ln()),
-            MeshAim::Size(size) => (finer.mesh.longest_side() / size).ln() / REFINEMENT.ln(),
+            MeshAim::Error(error) => libm::log(estimate / error) / (PREDICTED_ORDER * libm::log(REFINEMENT)),
+            MeshAim::Size(size) => libm::log(finer.mesh.longest_side() / size) / libm::log(REFINEMENT),
         };
         if wanted_jump <= 0.0 {
             return Ok(finer.finish(estimate, true));

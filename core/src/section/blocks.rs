@@ -24,7 +24,7 @@ impl Arc {
     /// The point at a part of the range of angles.
     pub fn at(&self, s: f64) -> Point {
         let angle = self.angles[0] + s * (self.angles[1] - self.angles[0]);
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = libm::sincos(angle);
         [self.centre[0] + self.semi_axes[0] * cos, self.centre[1] + self.semi_axes[1] * sin]
     }
 }

@@ -22,11 +22,11 @@ impl End {
     fn cells(self, distance: f64, density: f64, length: f64) -> f64 {
         match self {
             Self::Smooth => 0.0,
-            Self::Layer { thickness } => density * (distance / thickness).ln_1p(),
+            Self::Layer { thickness } => density * libm::log1p(distance / thickness),
             Self::Singular { radius } => {
                 let radius = radius.min(length);
-                let near = (distance.min(radius) / radius).cbrt();
-                let beyond = (distance / radius).max(1.0).ln() / 3.0;
+                let near = libm::cbrt(distance.min(radius) / radius);
+                let beyond = libm::log((distance / radius).max(1.0)) / 3.0;
                 density * (near + beyond)
             }
         }

@@ -86,6 +86,8 @@ pub enum SectionError {
     },
     /// The stiffness of the section could not be factorised
     Singular,
+    /// Somebody asked to stop
+    Interrupted,
 }
 
 impl fmt::Display for SectionError {
@@ -138,6 +140,7 @@ impl fmt::Display for SectionError {
             Self::Singular => {
                 write!(out, "the equations of the section are singular: check dimensions and elastic constants")
             }
+            Self::Interrupted => write!(out, "interrupted"),
         }
     }
 }

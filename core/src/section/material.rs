@@ -115,8 +115,8 @@ impl Material {
 /// The wall tangent is t = (0, cos beta, sin beta), the normal n = e1 x t. The fibre is
 /// cos theta e1 + sin theta t: positive theta turns it from axis 1 towards the tangent.
 pub fn material_axes(beta: f64, theta: f64) -> Matrix3<f64> {
-    let (sin_beta, cos_beta) = beta.sin_cos();
-    let (sin_theta, cos_theta) = theta.sin_cos();
+    let (sin_beta, cos_beta) = libm::sincos(beta);
+    let (sin_theta, cos_theta) = libm::sincos(theta);
     Matrix3::new(
         cos_theta,
         sin_theta * cos_beta,

@@ -45,7 +45,7 @@ impl Tangent {
         match self {
             Self::Fixed(beta) => *beta,
             Self::Around { centre, counterclockwise } => {
-                let radial = (at[1] - centre[1]).atan2(at[0] - centre[0]);
+                let radial = libm::atan2(at[1] - centre[1], at[0] - centre[0]);
                 let quarter = std::f64::consts::FRAC_PI_2;
                 radial + if *counterclockwise { quarter } else { -quarter }
             }
@@ -113,7 +113,7 @@ impl Mesh {
     pub fn longest_side(&self) -> f64 {
         let length = |element: &Element, side: usize| {
             let [a, b, _] = element.kind.side(side).map(|local| self.nodes[element.nodes[local] as usize]);
-            (a[0] - b[0]).hypot(a[1] - b[1])
+            libm::hypot(a[0] - b[0], a[1] - b[1])
         };
         let sides = self.elements.iter().flat_map(|e| (0..e.kind.corners()).map(move |side| length(e, side)));
         sides.fold(0.0, f64::max)
@@ -133,7 +133,7 @@ impl Mesh {
 
     /// Turns the section about the origin from axis 2 towards axis 3, with its wall tangents.
     pub fn turn(&mut self, angle: f64) {
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = libm::sincos(angle);
         let turn_point = |point: &mut Point| {
             *point = [cos * point[0] - sin * point[1], sin * point[0] + cos * point[1]];
         };
@@ -251,7 +251,7 @@ struct BoundaryPiece {
 pub fn lines_cross(first: [Point; 2], second: [Point; 2], tolerance: f64) -> bool {
     let side_of = |[a, b]: [Point; 2], p: Point| {
         let [along, to] = [[b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]];
-        let length = along[0].hypot(along[1]);
+        let length = libm::hypot(along[0], along[1]);
         let distance = (along[0] * to[1] - along[1] * to[0]) / length;
         // Round-off of coordinates must not look like a crossing of lines that touch.
         if distance.abs() <= tolerance.max(1e-9 * length) { 0.0 } else { distance.signum() }

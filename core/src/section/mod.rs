@@ -17,7 +17,6 @@
 
 pub mod analysis;
 pub mod blocks;
-pub mod cholesky;
 pub mod divide;
 pub mod element;
 pub mod error;

@@ -138,7 +138,7 @@ impl Outline {
             Side::Arc { centre, counterclockwise } => {
                 let [start, end] = arc_angles(from, to, centre, counterclockwise);
                 let radius = distance(from, centre);
-                let (sin, cos) = (start + s * (end - start)).sin_cos();
+                let (sin, cos) = libm::sincos(start + s * (end - start));
                 [centre[0] + radius * cos, centre[1] + radius * sin]
             }
         }
@@ -181,7 +181,7 @@ impl Outline {
         let [before, after] = self.tangents_at(point);
         let sine = before[0] * after[1] - before[1] * after[0];
         let cosine = before[0] * after[0] + before[1] * after[1];
-        std::f64::consts::PI - sine.atan2(cosine)
+        std::f64::consts::PI - libm::atan2(sine, cosine)
     }
 
     /// Unit tangents of the sides before and after a point.
@@ -201,14 +201,14 @@ impl Outline {
                 [-sense * (at[1] - centre[1]), sense * (at[0] - centre[0])]
             }
         };
-        let length = along[0].hypot(along[1]);
+        let length = libm::hypot(along[0], along[1]);
         [along[0] / length, along[1] / length]
     }
 }
 
 /// Start and end angle of an arc in its sense.
 pub fn arc_angles(from: Point, to: Point, centre: Point, counterclockwise: bool) -> [f64; 2] {
-    let angle = |at: Point| (at[1] - centre[1]).atan2(at[0] - centre[0]);
+    let angle = |at: Point| libm::atan2(at[1] - centre[1], at[0] - centre[0]);
     let start = angle(from);
     let turn = (angle(to) - start).rem_euclid(std::f64::consts::TAU);
     [start, start + if counterclockwise { turn } else { turn - std::f64::consts::TAU }]
@@ -238,8 +238,8 @@ impl Fillet {
         if radius <= 0.0 || sine.abs() < SMOOTH {
             return None;
         }
-        let half_turn = 0.5 * sine.abs().atan2(cosine);
-        let cut = radius * half_turn.tan();
+        let half_turn = 0.5 * libm::atan2(sine.abs(), cosine);
+        let cut = radius * libm::tan(half_turn);
         let start = [at[0] - cut * first[0], at[1] - cut * first[1]];
         let end = [at[0] + cut * second[0], at[1] + cut * second[1]];
         let turns_left = sine > 0.0;
@@ -266,7 +266,7 @@ fn without_repeats(corners: &[(Point, f64)]) -> Vec<(Point, f64)> {
 
 /// The distance of two points.
 pub fn distance(a: Point, b: Point) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 #[cfg(test)]

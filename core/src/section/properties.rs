@@ -56,9 +56,9 @@ impl Properties {
 /// Eigenvalues of [[a, c], [c, b]], larger first, and the angle of the axis of the smaller one.
 fn principal([a, b, c]: [f64; 3]) -> ([f64; 2], f64) {
     let half_difference = 0.5 * (a - b);
-    let radius = half_difference.hypot(c);
+    let radius = libm::hypot(half_difference, c);
     let mean = 0.5 * (a + b);
-    let angle = if radius <= 1e-12 * mean { 0.0 } else { 0.5 * (-c).atan2(-half_difference) };
+    let angle = if radius <= 1e-12 * mean { 0.0 } else { 0.5 * libm::atan2(-c, -half_difference) };
     ([mean + radius, mean - radius], angle)
 }
 
@@ -99,7 +99,7 @@ pub fn load_about_origin(load: &Vector6, reference: Point) -> Vector6 {
 
 /// Stiffness, mass or compliance in axes that are turned by an angle from axis 2 towards axis 3.
 pub fn turned(matrix: &Matrix6, angle: f64) -> Matrix6 {
-    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = libm::sincos(angle);
     // Rows are the new axes in the old ones.
     let axes = Matrix3::new(1.0, 0.0, 0.0, 0.0, cos, sin, 0.0, -sin, cos);
     let mut both = Matrix6::zeros();

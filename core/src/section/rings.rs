@@ -106,6 +106,6 @@ fn ellipse(mesher: &mut BlockMesher, semi_axes: [f64; 2]) -> [u32; 4] {
 fn quarter_points(semi_axes: [f64; 2]) -> [Point; 4] {
     std::array::from_fn(|k| {
         let angle = FRAC_PI_4 + k as f64 * FRAC_PI_2;
-        [semi_axes[0] * angle.cos(), semi_axes[1] * angle.sin()]
+        [semi_axes[0] * libm::cos(angle), semi_axes[1] * libm::sin(angle)]
     })
 }

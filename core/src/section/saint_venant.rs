@@ -14,12 +14,12 @@
 //! leaves four strains psi4 = (G1, K1, K2, K3), and the shear stiffness follows from the energy of
 //! the warping under N2 and N3.
 
-use super::cholesky::{Cholesky, NodeGraph};
 use super::element::{MAX_NODES, SectionPoint};
 use super::error::SectionError;
 use super::material::{Material, material_axes, rotated_stiffness};
 use super::mesh::{Element, Mesh, Tangent};
 use super::{Matrix6, Point, Vector6};
+use crate::solve::{Cholesky, NodeGraph};
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
 /// Components of the shear strains g13 and g12
@@ -598,7 +598,7 @@ pub fn half_diagonal(mesh: &Mesh) -> f64 {
         let values = mesh.nodes.iter().map(|node| node[axis]);
         values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
     };
-    0.5 * extent(0).hypot(extent(1))
+    0.5 * libm::hypot(extent(0), extent(1))
 }
 
 /// Largest difference of resultants from the identity, with moments divided by a length.

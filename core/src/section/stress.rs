@@ -111,7 +111,10 @@ impl NodalStresses {
     ) -> Option<Peak> {
         let near_corner = |at: Point| {
             corners == Corners::Exclude
-                && mesh.corners.iter().any(|corner| (at[0] - corner.at[0]).hypot(at[1] - corner.at[1]) < corner.wall)
+                && mesh
+                    .corners
+                    .iter()
+                    .any(|corner| libm::hypot(at[0] - corner.at[0], at[1] - corner.at[1]) < corner.wall)
         };
         let mut largest: Option<Peak> = None;
         for (place, unit) in self.places.iter().zip(&self.unit) {

@@ -65,7 +65,7 @@ struct ChordArc {
 impl ChordArc {
     /// The point of the arc at a part of the chord's angle.
     fn at(&self, s: f64) -> Point {
-        let (sin, cos) = (self.angles[0] + s * (self.angles[1] - self.angles[0])).sin_cos();
+        let (sin, cos) = libm::sincos(self.angles[0] + s * (self.angles[1] - self.angles[0]));
         [self.centre[0] + self.radius * cos, self.centre[1] + self.radius * sin]
     }
 }
@@ -91,7 +91,7 @@ impl Sizes {
         let near = self.corners.iter().map(|corner| {
             let smallest = corner.wall / self.per_wall.powi(3);
             let part = distance(at, corner.at) / corner.wall;
-            (3.0 / self.per_wall * part.powf(2.0 / 3.0) * corner.wall).max(smallest)
+            (3.0 / self.per_wall * libm::pow(part, 2.0 / 3.0) * corner.wall).max(smallest)
         });
         near.fold(self.largest, f64::min)
     }
@@ -287,7 +287,7 @@ impl Boundaries {
                     let b = outline.at(side, (k + 1) as f64 / chords as f64);
                     let along = [b[0] - a[0], b[1] - a[1]];
                     let determinant = direction[1] * along[0] - direction[0] * along[1];
-                    if determinant.abs() < 1e-9 * along[0].hypot(along[1]) {
+                    if determinant.abs() < 1e-9 * libm::hypot(along[0], along[1]) {
                         continue;
                     }
                     let gap = [a[0] - from[0], a[1] - from[1]];
@@ -365,7 +365,7 @@ impl Chords {
 /// The part of a line at which a point lies between its ends.
 fn part_of_line(point: Point, from: Point, to: Point, tolerance: f64) -> Option<f64> {
     let along = [to[0] - from[0], to[1] - from[1]];
-    let length = along[0].hypot(along[1]);
+    let length = libm::hypot(along[0], along[1]);
     let gap = [point[0] - from[0], point[1] - from[1]];
     let across = (along[0] * gap[1] - along[1] * gap[0]) / length;
     let ahead = (along[0] * gap[0] + along[1] * gap[1]) / length;
@@ -393,7 +393,7 @@ fn divide_side(outline: &Outline, side: usize, sizes: &Sizes, fineness: Fineness
     };
     // Places of the integral of 1 / size, denser towards both ends, where corners are.
     const SAMPLES: usize = 200;
-    let place = |k: usize| 0.5 * (1.0 - (PI * k as f64 / SAMPLES as f64).cos());
+    let place = |k: usize| 0.5 * (1.0 - libm::cos(PI * k as f64 / SAMPLES as f64));
     let mut wanted = vec![0.0];
     for k in 0..SAMPLES {
         let middle = 0.5 * (place(k) + place(k + 1));
@@ -461,7 +461,7 @@ fn triangulate_with(
         add_frame(&mut triangulation, chords, 2.0 * sizes.largest).map_err(failed)?;
     }
     let parameters = RefinementParameters::<f64>::new()
-        .with_angle_limit(AngleLimit::from_deg(min_angle))
+        .with_angle_limit(AngleLimit::from_radius_to_shortest_edge_ratio(0.5 / libm::sin(min_angle.to_radians())))
         .with_max_allowed_area(MAX_AREA * sizes.largest * sizes.largest)
         .with_max_additional_vertices(MAX_VERTICES)
         // Counts how often outlines are crossed: regions inside others would count as holes.

@@ -172,7 +172,7 @@ impl Line {
             Some(Bend { centre, counterclockwise }) => Tangent::Around { centre, counterclockwise },
             None => {
                 let [t2, t3] = line.tangent_at(0.0);
-                Tangent::Fixed(t3.atan2(t2))
+                Tangent::Fixed(libm::atan2(t3, t2))
             }
         };
         Ok(line)
@@ -225,7 +225,7 @@ impl Line {
             Some(bend) => {
                 let [start, end] = self.angles(bend);
                 let radius = distance(self.ends[0], bend.centre);
-                let (sin, cos) = (start + part * (end - start)).sin_cos();
+                let (sin, cos) = libm::sincos(start + part * (end - start));
                 [bend.centre[0] + radius * cos, bend.centre[1] + radius * sin]
             }
         }

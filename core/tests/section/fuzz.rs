@@ -1,10 +1,10 @@
 //! Random outlines and walls: a mesh or an error, never a panic.
 
-use sec::section::geometry::{Geometry, Shape};
-use sec::section::mesh::Region;
-use sec::section::outline::Outline;
-use sec::section::triangulate::PlanarRegion;
-use sec::section::walls::{Ply, Walls};
+use beamsim_core::section::geometry::{Geometry, Shape};
+use beamsim_core::section::mesh::Region;
+use beamsim_core::section::outline::Outline;
+use beamsim_core::section::triangulate::PlanarRegion;
+use beamsim_core::section::walls::{Ply, Walls};
 use std::collections::BTreeMap;
 
 /// Numbers from 0 to 1 (Knuth's linear congruential generator).

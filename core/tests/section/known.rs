@@ -1,17 +1,17 @@
 //! Sections with published or closed-form results that are not among the reference cases.
 
-use sec::section::analysis::{Analysis, DEFAULT_AIM, MeshAim, Reference, analyse};
-use sec::section::geometry::{Geometry, Profile, Shape};
-use sec::section::grid::Rect;
-use sec::section::material::{Elastic, Material};
-use sec::section::mesh::Region;
-use sec::section::outline::Outline;
-use sec::section::properties::{moved, relative_difference, turned};
-use sec::section::saint_venant::solve;
-use sec::section::stress::{Corners, von_mises};
-use sec::section::triangulate::PlanarRegion;
-use sec::section::walls::{Bend, Ply, Walls};
-use sec::section::{Matrix6, SectionError, Vector6};
+use beamsim_core::section::analysis::{Analysis, DEFAULT_AIM, MeshAim, Reference, analyse};
+use beamsim_core::section::geometry::{Geometry, Profile, Shape};
+use beamsim_core::section::grid::Rect;
+use beamsim_core::section::material::{Elastic, Material};
+use beamsim_core::section::mesh::Region;
+use beamsim_core::section::outline::Outline;
+use beamsim_core::section::properties::{moved, relative_difference, turned};
+use beamsim_core::section::saint_venant::solve;
+use beamsim_core::section::stress::{Corners, von_mises};
+use beamsim_core::section::triangulate::PlanarRegion;
+use beamsim_core::section::walls::{Bend, Ply, Walls};
+use beamsim_core::section::{Matrix6, SectionError, Vector6};
 use std::f64::consts::PI;
 
 fn unit_material() -> Vec<Material> {
@@ -392,7 +392,7 @@ fn branched_walls_are_those_of_rectangles() {
         assert_eq!(first.mesh.corners.len(), 8);
         assert_eq!(second.mesh.corners.len(), 8);
         for corner in &first.mesh.corners {
-            let near = |other: &&sec::section::mesh::ReentrantCorner| {
+            let near = |other: &&beamsim_core::section::mesh::ReentrantCorner| {
                 (other.at[0] - corner.at[0]).hypot(other.at[1] - corner.at[1]) < 1e-9
             };
             assert!(second.mesh.corners.iter().any(|other| near(&other)), "{corner:?}");

@@ -1,21 +1,21 @@
 //! The reference cases of `tests/section_cases.json`.
 
-use sec::section::analysis::{Analysis, DEFAULT_AIM, MeshAim, analyse};
-use sec::section::geometry::{Geometry, Profile, Shape};
-use sec::section::grid::Rect;
-use sec::section::material::{Elastic, Material};
-use sec::section::mesh::{Region, Tangent};
-use sec::section::outline::Outline;
-use sec::section::properties::{mass_centre, relative_difference};
-use sec::section::stress::{Corners, von_mises};
-use sec::section::triangulate::PlanarRegion;
-use sec::section::walls::{Ply, Walls};
-use sec::section::{Matrix6, Vector6};
+use beamsim_core::section::analysis::{Analysis, DEFAULT_AIM, MeshAim, analyse};
+use beamsim_core::section::geometry::{Geometry, Profile, Shape};
+use beamsim_core::section::grid::Rect;
+use beamsim_core::section::material::{Elastic, Material};
+use beamsim_core::section::mesh::{Region, Tangent};
+use beamsim_core::section::outline::Outline;
+use beamsim_core::section::properties::{mass_centre, relative_difference};
+use beamsim_core::section::stress::{Corners, von_mises};
+use beamsim_core::section::triangulate::PlanarRegion;
+use beamsim_core::section::walls::{Ply, Walls};
+use beamsim_core::section::{Matrix6, Vector6};
 use serde_json::Value;
 use std::time::Instant;
 
 fn cases() -> Vec<Value> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/section_cases.json");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/section/section_cases.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
@@ -193,7 +193,7 @@ fn peak_error(case: &Value, analysis: &Analysis, materials: &[Material]) -> Opti
     Some(worst)
 }
 
-fn run(aim: f64, tolerance: impl Fn(&str) -> f64) {
+fn run(aim: f64, tolerance: impl Fn(&Value) -> f64) {
     println!(
         "{:24} {:>9} {:>9} {:>8} {:>6} {:>5} {:>9} {:>9} {:>9} {:>9}",
         "case", "error K", "estimate", "seconds", "nodes", "level", "check", "GJ", "stress", "max vm"
@@ -225,29 +225,33 @@ fn run(aim: f64, tolerance: impl Fn(&str) -> f64) {
         let peak = peak_error(&case, &analysis, &materials).unwrap_or(0.0);
         let size = analysis.solution.area.sqrt();
         let near = |key: &str, found: [f64; 2]| {
-            (0..2).all(|axis| (found[axis] - case[key][axis].as_f64().unwrap()).abs() < 3.0 * tolerance(name) * size)
+            (0..2).all(|axis| (found[axis] - case[key][axis].as_f64().unwrap()).abs() < 3.0 * tolerance(&case) * size)
         };
         let mut faults = Vec::new();
+        // On a machine of 2026 the largest takes 0.16 s.
+        if aim == DEFAULT_AIM && analysis.mesh.nodes.len() > 5000 {
+            faults.push("size");
+        }
         if analysis.solution.resultant_check > 1e-7 {
             faults.push("resultants");
         }
         if stress > point_tolerance || peak > peak_tolerance {
             faults.push("stress");
         }
-        if error > tolerance(name) {
+        if error > tolerance(&case) {
             faults.push("stiffness");
         }
-        if gj.abs() > 2.0 * tolerance(name) {
+        if gj.abs() > 2.0 * tolerance(&case) {
             faults.push("GJ");
         }
-        if (analysis.solution.area / number(&case, "area") - 1.0).abs() > tolerance(name) {
+        if (analysis.solution.area / number(&case, "area") - 1.0).abs() > tolerance(&case) {
             faults.push("area");
         }
         if !near("shear_centre", properties.shear_centre) || !near("tension_centre", properties.tension_centre) {
             faults.push("centres");
         }
         if case["mass"].is_array() {
-            if relative_difference(&analysis.solution.mass, &matrix(&case["mass"])) > tolerance(name) {
+            if relative_difference(&analysis.solution.mass, &matrix(&case["mass"])) > tolerance(&case) {
                 faults.push("mass");
             }
             if !near("mass_centre", mass_centre(&analysis.solution.mass)) {
@@ -267,14 +271,13 @@ fn default_mesh() {
     run(DEFAULT_AIM, |_| 1e-3);
 }
 
+/// The uncertainty of a reference is its last change between meshes.
 #[test]
 #[ignore = "a minute without optimisation"]
 fn fine_mesh() {
-    // References of composites are uncertain themselves, see `fe.change_between_meshes`.
-    run(1e-5, |name| match name {
-        "box_cus15" => 4e-4,
-        "anba_anisotropic_strip" => 8e-5,
-        _ => 5e-5,
+    run(1e-5, |case| {
+        let changes = case["fe"]["change_between_meshes"].as_array().unwrap();
+        1e-5 + changes.last().unwrap().as_f64().unwrap()
     });
 }
 
@@ -293,7 +296,7 @@ fn levels_of_composites() {
         let mut before = reference;
         for level in 0..7 {
             let mesh = geometry.mesh(level).unwrap();
-            let solution = sec::section::saint_venant::solve(&mesh, &materials).unwrap();
+            let solution = beamsim_core::section::saint_venant::solve(&mesh, &materials).unwrap();
             let k = solution.stiffness;
             let scaled = Matrix6::from_fn(|i, j| {
                 1e6 * (k[(i, j)] - reference[(i, j)]) / (reference[(i, i)] * reference[(j, j)]).sqrt()
