@@ -2,7 +2,7 @@
 
 use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table, joined, kind_of};
-use super::words::{Words, words};
+use super::section_shape::{self, ComputedSection};
 use toml::de::DeValue;
 
 /// `[section.NAME]`
@@ -33,15 +33,26 @@ pub enum SectionBody {
         /// 6x6 mass
         mass: Option<[[f64; 6]; 6]>,
     },
-    /// Shape and material
+    /// A circle, a tube or a rectangle, and its material
     Shaped {
         /// Shape with its dimensions
         shape: Shape,
         /// Name of the material
         material: Spanned<String>,
         /// Shear factors along 2 and 3, if not Cowper's
-        shear_factor: Option<[f64; 2]>,
+        shear_factor: Option<ShearFactor>,
     },
+    /// A shape whose matrices are computed
+    Computed(Box<ComputedSection>),
+}
+
+/// `shear_factor = …`
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShearFactor {
+    /// Along 2 and 3
+    Given([f64; 2]),
+    /// That of the energy of Saint-Venant flexure
+    Energy,
 }
 
 /// A cross-section.
@@ -68,47 +79,29 @@ pub enum Shape {
     },
 }
 
-words! {
-    /// `shape = …`
-    pub enum ShapeWord {
-        /// Solid circle
-        Circle = "circle",
-        /// Ring
-        Tube = "tube",
-        /// Solid rectangle
-        Rectangle = "rectangle",
-    }
-}
-
-impl ShapeWord {
-    /// Keys of the dimensions of a shape.
-    fn keys(self) -> &'static [&'static str] {
-        match self {
-            Self::Circle => &["radius"],
-            Self::Tube => &["radius", "thickness"],
-            Self::Rectangle => &["width", "height"],
-        }
-    }
-}
-
 const RESULTANT_KEYS: [&str; 6] = ["EA", "GA", "GJ", "EI", "rhoA", "rhoJ"];
 const FULL_KEYS: [&str; 2] = ["stiffness", "mass"];
-const SHAPE_KEYS: [&str; 7] = ["material", "shape", "radius", "thickness", "width", "height", "shear_factor"];
-const DIMENSIONS: [&str; 4] = ["radius", "thickness", "width", "height"];
 
 /// Keys of `[section.NAME]`.
-pub(super) const KEYS: [&str; 15] = joined(&[&RESULTANT_KEYS, &FULL_KEYS, &SHAPE_KEYS]);
+pub(super) const KEYS: [&str; 8 + section_shape::KEYS.len()] =
+    joined(&[&RESULTANT_KEYS, &FULL_KEYS, &section_shape::KEYS]);
 
-pub(super) fn read_section<'a>(context: &'a Context, name: Spanned<String>, item: &'a Item<'a>) -> Option<Section> {
+/// Reads a section; `layups` are the names of all layups of the deck.
+pub(super) fn read_section<'a>(
+    context: &'a Context,
+    name: Spanned<String>,
+    item: &'a Item<'a>,
+    layups: &[String],
+) -> Option<Section> {
     let table = Table::new(context, item, format!("[section.{}]", name.value), &KEYS)?;
     let first_of = |keys: &[&'static str]| keys.iter().copied().find(|key| table.has(key));
     let by_resultants = first_of(&RESULTANT_KEYS);
     let by_matrices = first_of(&FULL_KEYS);
-    let by_shape = first_of(&SHAPE_KEYS);
+    let by_shape = first_of(&section_shape::KEYS);
     let body = match (by_resultants, by_matrices, by_shape) {
         (Some(_), None, None) => read_resultants(&table),
         (None, Some(_), None) => read_full(&table),
-        (None, None, Some(_)) => read_shaped(&table),
+        (None, None, Some(_)) => section_shape::read_shaped(&table, layups),
         (None, None, None) => table.wrong(format!(
             "{} needs section stiffnesses (EA, GA, GJ, EI), or `stiffness`, or `material` and `shape`",
             table.what
@@ -122,7 +115,7 @@ pub(super) fn read_section<'a>(context: &'a Context, name: Spanned<String>, item
 }
 
 /// Two positive numbers, or one for both.
-fn read_pair(table: &Table, key: &str) -> Option<[f64; 2]> {
+pub(super) fn read_pair(table: &Table, key: &str) -> Option<[f64; 2]> {
     let item = table.required(key)?;
     let values = match item.get_ref() {
         DeValue::Array(_) => table.context.vector::<2>(item)?,
@@ -184,33 +177,4 @@ pub(super) fn read_matrix<const N: usize>(table: &Table, key: &str, item: &Item)
         }
     }
     Some(out)
-}
-
-fn read_shaped(table: &Table) -> Option<SectionBody> {
-    let context = table.context;
-    let material = table.required("material");
-    let shape = table.required("shape");
-    let material = context.text(material?)?;
-    let kind: ShapeWord = context.word(shape?, "shape")?.value;
-    for key in DIMENSIONS.into_iter().filter(|key| !kind.keys().contains(key)) {
-        table.refuse(key, format!("`{key}` is not allowed with shape = \"{}\"", kind.word()));
-    }
-    for key in kind.keys() {
-        table.required(key);
-    }
-    let size = |key: &str| table.positive(key).map(|v| v.value);
-    let shape = match kind {
-        ShapeWord::Circle => Shape::Circle { radius: size("radius")? },
-        ShapeWord::Tube => {
-            let radius = size("radius")?;
-            let thickness = size("thickness")?;
-            if thickness > radius {
-                return table.wrong_key("thickness", "the wall is thicker than the radius");
-            }
-            Shape::Tube { radius, thickness }
-        }
-        ShapeWord::Rectangle => Shape::Rectangle { width: size("width")?, height: size("height")? },
-    };
-    let shear_factor = table.optional("shear_factor", |_, _| read_pair(table, "shear_factor"))?;
-    Some(SectionBody::Shaped { shape, material, shear_factor })
 }

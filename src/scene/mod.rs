@@ -2,6 +2,7 @@
 
 mod check;
 mod compose;
+mod computed;
 mod constraints;
 mod figure;
 mod joints;

@@ -100,7 +100,11 @@ impl Computed {
             return Err(SectionError::Interrupted);
         }
         let mesh = geometry.mesh(level)?;
-        let solution = solve(&mesh, materials)?;
+        let mut solution = solve(&mesh, materials)?;
+        if materials.iter().all(Material::is_isotropic) {
+            // A mesh need not be as symmetric as its shape.
+            solution.impose_mirrors(geometry.mirrors());
+        }
         Ok(Self { level, mesh, solution })
     }
 

@@ -5,7 +5,7 @@ use super::error::{self, SectionError};
 use super::grid::{Fineness, Rect, mesh_rects};
 use super::mesh::{Mesh, Region};
 use super::outline::Outline;
-use super::rings::{Ring, mesh_rings};
+use super::rings::mesh_ellipse;
 use super::triangulate::{PlanarRegion, mesh_regions};
 use super::walls::{Walls as WallGraph, mesh_walls};
 
@@ -37,13 +37,6 @@ pub enum Shape {
         thickness: Option<f64>,
         /// Material and orientation
         region: Region,
-    },
-    /// Circular rings around each other, from inside to outside
-    Rings {
-        /// Radius of the hole; without it the first ring is solid
-        hole: Option<f64>,
-        /// Outer radius and region of each ring
-        rings: Vec<(f64, Region)>,
     },
     /// Rectangles with sides along 2 and 3 that touch along edges, in their own coordinates
     Rects {
@@ -152,6 +145,12 @@ impl Geometry {
         Self { shape, turn: 0.0, shift: [0.0; 2] }
     }
 
+    /// True if the section, of isotropic materials, is its own mirror image with the other sign of
+    /// axis 2, and of axis 3.
+    pub fn mirrors(&self) -> [bool; 2] {
+        if self.turn == 0.0 && self.shift == [0.0; 2] { self.shape.mirrors() } else { [false; 2] }
+    }
+
     /// A mesh of some level (0 the coarsest), checked.
     pub fn mesh(&self, level: usize) -> Result<Mesh, SectionError> {
         let mut mesh = self.shape.mesh(Fineness::level(level))?;
@@ -170,6 +169,15 @@ impl Geometry {
 }
 
 impl Shape {
+    /// True if the shape is its own mirror image with the other sign of axis 2, and of axis 3.
+    fn mirrors(&self) -> [bool; 2] {
+        match self {
+            Self::Ellipse { .. } => [true; 2],
+            Self::Profile { profile, .. } => profile.mirrors(),
+            Self::Rects { .. } | Self::Regions(_) | Self::Walls(_) => [false; 2],
+        }
+    }
+
     fn mesh(&self, fineness: Fineness) -> Result<Mesh, SectionError> {
         match self {
             Self::Ellipse { semi_axes, thickness, region } => {
@@ -179,14 +187,7 @@ impl Shape {
                     check_positive(&[("the radius of the hole", semi_axes[0].min(semi_axes[1]) - thickness)])?;
                     check_slenderness(semi_axes[0].max(semi_axes[1]) / thickness)?;
                 }
-                let ring = Ring { semi_axes: *semi_axes, region: 0 };
-                mesh_rings(hole, &[ring], std::slice::from_ref(region), fineness)
-            }
-            Self::Rings { hole, rings } => {
-                let regions: Vec<Region> = rings.iter().map(|(_, region)| region.clone()).collect();
-                let ring = |(region, (radius, _)): (usize, &(f64, Region))| Ring { semi_axes: [*radius; 2], region };
-                let rings: Vec<Ring> = rings.iter().enumerate().map(ring).collect();
-                mesh_rings(hole.map(|radius| [radius; 2]), &rings, &regions, fineness)
+                mesh_ellipse(*semi_axes, hole, region, fineness)
             }
             Self::Rects { rects, regions } => mesh_rects(rects, regions, fineness),
             Self::Profile { profile, region } => profile.mesh(region, fineness),
@@ -197,6 +198,17 @@ impl Shape {
 }
 
 impl Profile {
+    /// True if the profile is its own mirror image with the other sign of axis 2, and of axis 3.
+    fn mirrors(&self) -> [bool; 2] {
+        match *self {
+            Self::Rectangle { .. } | Self::Box { .. } => [true; 2],
+            Self::I { b, t_f, b_top, t_f_top, .. } => [true, b == b_top && t_f == t_f_top],
+            Self::Channel { .. } => [false, true],
+            Self::T { .. } => [true, false],
+            Self::Angle { .. } => [false; 2],
+        }
+    }
+
     /// Quadrilaterals where all corners are sharp, else triangles.
     fn mesh(&self, region: &Region, fineness: Fineness) -> Result<Mesh, SectionError> {
         self.check()?;

@@ -265,6 +265,23 @@ impl Solution {
         Ok(self)
     }
 
+    /// Removes couplings that vanish in a section that is its own mirror image with the other sign
+    /// of axis 2, and of axis 3.
+    pub fn impose_mirrors(&mut self, mirrors: [bool; 2]) {
+        // Components that change their sign with axis 2, and with axis 3.
+        const ODD: [[bool; 6]; 2] = [[false, true, false, true, false, true], [false, false, true, true, true, false]];
+        for axis in (0..2).filter(|&axis| mirrors[axis]) {
+            self.centroid[axis] = 0.0;
+            for matrix in [&mut self.compliance, &mut self.stiffness, &mut self.mass] {
+                for i in 0..6 {
+                    for j in (0..6).filter(|&j| ODD[axis][i] != ODD[axis][j]) {
+                        matrix[(i, j)] = 0.0;
+                    }
+                }
+            }
+        }
+    }
+
     /// Strains at a point of an element under the six unit resultants, by columns.
     pub fn unit_strains(&self, element: &Element, point: &SectionPoint) -> Matrix6 {
         let mut strains = Matrix6::zeros();

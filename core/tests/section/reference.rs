@@ -122,8 +122,13 @@ fn regions_geometry(regions: &[Value], materials: &[Material]) -> Geometry {
         let rects = regions.iter().enumerate().map(rect).collect();
         return Geometry::new(Shape::Rects { rects, regions: regions.iter().map(of).collect() });
     }
-    let rings = regions.iter().map(|value| (number(value, "radius"), of(value))).collect();
-    Geometry::new(Shape::Rings { hole: None, rings })
+    let ring = |value: &Value| {
+        let radius = number(value, "radius");
+        let hole = value["thickness"].as_f64().map(|thickness| Outline::circle([0.0; 2], radius - thickness));
+        let outline = Outline::circle([0.0; 2], radius);
+        PlanarRegion { region: of(value), outline, holes: hole.into_iter().collect() }
+    };
+    Geometry::new(Shape::Regions(regions.iter().map(ring).collect()))
 }
 
 /// CUS: plies of +15 degrees in walls that go around clockwise, with the outside on the left.
