@@ -8,6 +8,7 @@ use crate::deck::{
     Shape, SideWord, Span, Spanned, ThetaSenseWord, WallPlies,
 };
 use beamsim_core::model::{MassPerLength, SectionMatrices};
+use beamsim_core::section::airfoil;
 use beamsim_core::section::analysis::{self, Analysis, DEFAULT_AIM, MeshAim, SectionWarning, analyse};
 use beamsim_core::section::geometry::{self, Geometry, Profile};
 use beamsim_core::section::grid::Rect;
@@ -239,10 +240,7 @@ impl Draft<'_> {
         let profile = match self.body.shape {
             ComputedShape::Regions(ref regions) => return self.regions_shape(regions),
             ComputedShape::Walls(ref walls) => return Ok(geometry::Shape::Walls(self.walls(walls)?)),
-            ComputedShape::Airfoil(_) => {
-                let message = "airfoils are not supported yet: describe the skin by shape = \"walls\"";
-                return Err(Diagnostic::error(message, self.body.span.clone()));
-            }
+            ComputedShape::Airfoil(ref airfoil) => return Ok(geometry::Shape::Walls(self.airfoil(airfoil)?)),
             ComputedShape::Polygon { ref outline, ref holes } => {
                 let region = self.own_region()?;
                 let outline = self.outline(outline, &region.name)?;
@@ -340,6 +338,43 @@ impl Draft<'_> {
             made.add(from, to, bend, left, &plies);
         }
         Ok(made)
+    }
+
+    fn airfoil(&mut self, airfoil: &deck::Airfoil) -> Result<Walls, Diagnostic> {
+        let span = &airfoil.profile.span;
+        if airfoil.trailing_edge == deck::TrailingEdgeWord::Fill {
+            let message = "`te = \"fill\"` is not supported yet: only `\"close\"` is";
+            return Err(Diagnostic::error(message, self.body.span.clone()));
+        }
+        let mut skin = Vec::new();
+        for (number, part) in airfoil.skin.iter().enumerate() {
+            let name = format!("skin {}", number + 1);
+            let layup = WallPlies::Layup(part.layup.clone());
+            let plies = self.plies(&layup, &name, false, &part.layup.span)?;
+            let sides = match part.side {
+                deck::SkinSideWord::Upper => [true, false],
+                deck::SkinSideWord::Lower => [false, true],
+                deck::SkinSideWord::Both => [true; 2],
+            };
+            skin.push(airfoil::SkinPart { ends: part.ends, sides, plies });
+        }
+        let mut webs = Vec::new();
+        for (number, web) in airfoil.webs.iter().enumerate() {
+            let name = format!("web {}", number + 1);
+            let plies = self.plies(&WallPlies::Layup(web.layup.clone()), &name, false, &web.span)?;
+            webs.push(airfoil::Web { at: web.at, plies });
+        }
+        self.regions.push(("profile".to_string(), span.clone()));
+        let made = airfoil::Airfoil {
+            profile: airfoil.profile.value.clone(),
+            chord: airfoil.chord,
+            pitch_axis: airfoil.pitch_axis,
+            leads_to_plus: airfoil.leading_edge == deck::LeadingEdgeWord::Plus,
+            skin,
+            webs,
+            fixed_sense: airfoil.theta_sense == ThetaSenseWord::Fixed,
+        };
+        made.walls().map_err(|error| self.explain(&error))
     }
 
     /// Plies of a wall or a part of a skin. `flips` turns all angles around.

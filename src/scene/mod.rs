@@ -17,8 +17,10 @@ mod section;
 mod switches;
 
 pub use compose::Reason;
+pub use computed::{Solution, SolvedSection, solved};
 pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
+pub use section::matrices as section_matrices;
 
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody, Target,

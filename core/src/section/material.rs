@@ -53,6 +53,14 @@ impl Material {
         matches!(self.elastic, Elastic::Isotropic { .. })
     }
 
+    /// Shear modulus of an isotropic material.
+    pub fn shear_modulus(&self) -> Option<f64> {
+        match self.elastic {
+            Elastic::Isotropic { e, nu } => Some(0.5 * e / (1.0 + nu)),
+            Elastic::Orthotropic { .. } => None,
+        }
+    }
+
     /// The stiffness in material axes, checked to be positive definite.
     pub fn stiffness(&self) -> Result<Matrix6, SectionError> {
         self.check_constants()?;

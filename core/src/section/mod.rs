@@ -15,6 +15,7 @@
 //! that a material bears; [`analysis`] chooses the mesh so that
 //! its estimated error meets an aim.
 
+pub mod airfoil;
 pub mod analysis;
 pub mod blocks;
 pub mod divide;
