@@ -469,7 +469,21 @@ pub(super) fn read_shaped(table: &Table, layups: &[String]) -> Option<SectionBod
     }
     let turn = turn.map_or(0.0, |turn| turn.value);
     let fibre = fibre?;
-    let span = kind.span;
+    let span = match kind.value {
+        ShapeWord::Polygon => table.key_span("outline"),
+        ShapeWord::Walls => table.key_span("walls"),
+        ShapeWord::Airfoil => table.key_span("profile"),
+        ShapeWord::Circle
+        | ShapeWord::Tube
+        | ShapeWord::Rectangle
+        | ShapeWord::Ellipse
+        | ShapeWord::I
+        | ShapeWord::Channel
+        | ShapeWord::T
+        | ShapeWord::Angle
+        | ShapeWord::Box
+        | ShapeWord::Regions => kind.span,
+    };
     Some(SectionBody::Computed(Box::new(ComputedSection {
         shape,
         span,

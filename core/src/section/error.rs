@@ -101,7 +101,7 @@ impl fmt::Display for SectionError {
             Self::PoissonRatio { material, nu } => {
                 write!(out, "material `{material}` has nu = {nu}: a section from a shape needs -1 < nu <= 0.4999")
             }
-            Self::NotPositive { what, value } => write!(out, "{what} is {value}, but must be positive"),
+            Self::NotPositive { what, value } => write!(out, "{what} is {}, but must be positive", rounded(*value)),
             Self::Dimensions { message } => write!(out, "{message}"),
             Self::CrossingEdges { first, second } => write!(
                 out,
@@ -155,7 +155,13 @@ pub fn check_positive(what: impl Into<String>, value: f64) -> Result<(), Section
     }
 }
 
+/// A number without the round-off of a difference.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
+}
+
 /// A point as "(x2, x3)".
-fn show(point: Point) -> String {
-    format!("({:.6}, {:.6})", point[0], point[1])
+pub fn show(point: Point) -> String {
+    let [x2, x3] = point.map(rounded);
+    format!("({x2}, {x3})")
 }

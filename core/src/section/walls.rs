@@ -9,7 +9,7 @@
 use super::Point;
 use super::blocks::{Arc, BlockMesher};
 use super::divide::{End, divide};
-use super::error::{SectionError, check_positive};
+use super::error::{SectionError, check_positive, show};
 use super::geometry::MAX_SLENDERNESS;
 use super::grid::Fineness;
 use super::mesh::{Mesh, ReentrantCorner, Region, Tangent};
@@ -305,7 +305,7 @@ fn joints(walls: &Walls, lines: &[Line]) -> Result<Vec<Joint>, SectionError> {
         let through = match best {
             None => ends.clone(),
             Some((cosine, ..)) if cosine > -MIN_MITRE => {
-                let message = format!("two walls fold back on each other at ({:.6}, {:.6})", at[0], at[1]);
+                let message = format!("two walls fold back on each other at {}", show(at));
                 return Err(SectionError::Dimensions { message });
             }
             Some((_, i, j)) => vec![ends[i], ends[j]],
@@ -421,8 +421,7 @@ impl Strips {
             let Some(through) = self.through(joint) else { continue };
             let is_round = through.iter().any(|&wall| self.lines[wall].bend.is_some());
             if is_round && self.turn(joint).abs() > SMOOTH_JOINT {
-                let [x2, x3] = known.at;
-                let message = format!("at ({x2:.6}, {x3:.6}) a round wall does not continue its neighbour smoothly");
+                let message = format!("at {} a round wall does not continue its neighbour smoothly", show(known.at));
                 return Err(SectionError::Dimensions { message });
             }
         }
@@ -463,8 +462,8 @@ impl Strips {
     /// The face against which a stem butts: its offset in the chain of the walls that go through.
     fn butt_face(&self, joint: usize, stem: WallEnd) -> Result<f64, SectionError> {
         let fail = |message: &str| {
-            let [x2, x3] = self.joints[joint].at;
-            Err(SectionError::Dimensions { message: format!("at ({x2:.6}, {x3:.6}) {message}") })
+            let at = show(self.joints[joint].at);
+            Err(SectionError::Dimensions { message: format!("at {at} {message}") })
         };
         let Some([before, after]) = self.through(joint) else { return fail("no wall goes through") };
         if [before, after, stem.wall].iter().any(|&wall| self.lines[wall].bend.is_some()) {
@@ -589,8 +588,7 @@ impl Strips {
         match part > 0.0 && part < 1.0 {
             true => Ok(part),
             false => {
-                let message =
-                    format!("at ({:.6}, {:.6}) a wall is too short for the branch that meets it", at[0], at[1]);
+                let message = format!("at {} a wall is too short for the branch that meets it", show(at));
                 Err(SectionError::Dimensions { message })
             }
         }
@@ -633,9 +631,9 @@ impl Strips {
                     };
                     let through = self.through(joint).into_iter().flatten();
                     if !through.into_iter().any(|wall| self.stations[wall].windows(2).any(meets)) {
-                        let [x2, x3] = self.joints[joint].at;
+                        let at = show(self.joints[joint].at);
                         let message = format!(
-                            "at ({x2:.6}, {x3:.6}) branches meet a wall too close to each other: move one of them, or \
+                            "at {at} branches meet a wall too close to each other: move one of them, or \
                              describe the section as regions"
                         );
                         return Err(SectionError::Dimensions { message });
