@@ -130,10 +130,13 @@ impl<'a> Report<'a> {
         let moment_of_area = Dimension { length: 2, ..Dimension::FORCE };
         if let Some(Properties { ea, gj, ga, shear_centre, tension_centre, ei, principal_angle }) = self.properties {
             console::line("  from the line of the beam, in its axes 2 and 3:");
+            // Of a centre on an axis only round-off is left.
+            let size = (ei[0] / ea).sqrt();
+            let [tension_centre, shear_centre] = [tension_centre, shear_centre].map(|at| without_round_off(at, size));
             self.point("tension centre", tension_centre);
             self.point("shear centre", shear_centre);
             if let Some(mass) = self.mass.filter(|mass| mass[(0, 0)] > 0.0) {
-                self.point("mass centre", mass_centre(&mass));
+                self.point("mass centre", without_round_off(mass_centre(&mass), size));
             }
             self.value("EA (1/S11, about the tension centre)", ea, Dimension::FORCE);
             self.value("GA2 (1/S22, about the shear centre)", ga[0], Dimension::FORCE);
@@ -267,6 +270,11 @@ fn rows(matrix: &Matrix6) -> String {
         format!("  [{}],\n", entries.join(", "))
     };
     format!("[\n{}]", (0..6).map(row).collect::<String>())
+}
+
+/// A point of a section of some size with zeros in the place of round-off.
+fn without_round_off(at: Point, size: f64) -> Point {
+    at.map(|x| if x.abs() < 1e-9 * size { 0.0 } else { x })
 }
 
 /// A number with ten digits.

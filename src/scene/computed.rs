@@ -179,7 +179,9 @@ impl Draft<'_> {
             None if self.body.shape.has_own_origin() => analysis::Reference::Point([0.0; 2]),
             None => analysis::Reference::TensionCentre,
         };
-        analysis.place(reference)
+        // A centre on an axis of the shape is there exactly.
+        let round_off = NO_COUPLING * analysis.solution.area.sqrt();
+        analysis.place(reference).map(|x| if x.abs() <= round_off { 0.0 } else { x })
     }
 
     /// Matrices about the line of the beam, in its axes.
@@ -525,7 +527,8 @@ fn without_round_off(matrix: &Matrix6) -> Matrix6 {
 /// Mass, its centre, and inertia about the line of the beam.
 fn mass_per_length(mass: &Matrix6) -> MassPerLength {
     let m = mass[(0, 0)];
-    let [x2, x3] = if m > 0.0 { mass_centre(mass) } else { [0.0; 2] };
+    // Adding zero makes -0 and 0 one.
+    let [x2, x3] = if m > 0.0 { mass_centre(mass).map(|x| x + 0.0) } else { [0.0; 2] };
     let inertia = [0, 1, 2].map(|i| [0, 1, 2].map(|j| mass[(3 + i, 3 + j)]));
     MassPerLength { mass: m, offset: Vec3([0.0, x2, x3]), about_line: Mat3(inertia) }
 }

@@ -58,7 +58,7 @@ fn principal([a, b, c]: [f64; 3]) -> ([f64; 2], f64) {
     let half_difference = 0.5 * (a - b);
     let radius = libm::hypot(half_difference, c);
     let mean = 0.5 * (a + b);
-    let angle = if radius <= 1e-12 * mean { 0.0 } else { 0.5 * libm::atan2(-c, -half_difference) };
+    let angle = if radius <= 1e-12 * mean { 0.0 } else { 0.5 * libm::atan2(0.0 - c, -half_difference) };
     ([mean + radius, mean - radius], angle)
 }
 

@@ -266,6 +266,28 @@ fn a_rectangle_warns_of_free_edges_by_its_shear_stiffness() {
     assert_near(ga[0] * 2.6 / 10.0, 0.17913, 1e-3, "shear coefficient along the thin side");
 }
 
+/// Smooth sections converge with the fourth power of the size of elements; grading keeps nearly
+/// that at re-entrant corners, where uniform meshes have the power 4/3.
+#[test]
+fn errors_fall_as_promised() {
+    let materials = unit_material();
+    let stiffness =
+        |geometry: &Geometry, level: usize| solve(&geometry.mesh(level).unwrap(), &materials).unwrap().stiffness;
+    let region = Region::new("section", 0);
+    let circle = Geometry::new(Shape::Ellipse { semi_axes: [1.0; 2], thickness: None, region });
+    // 4 and 9 cells in a quarter.
+    let error = |level: usize| stiffness(&circle, level)[(3, 3)] / (0.5 * PI / 2.6) - 1.0;
+    let order = (error(0) / error(2)).abs().ln() / (9.0_f64 / 4.0).ln();
+    println!("circle: order {order:.2}");
+    assert!(order > 3.8);
+    let tee = profile(Profile::T { d: 100.0, b: 80.0, t_f: 10.0, t_w: 8.0, r: 0.0 });
+    let levels: Vec<Matrix6> = (0..4).map(|level| stiffness(&tee, level)).collect();
+    let change = |level: usize| relative_difference(&levels[level], &levels[level + 1]);
+    let order = (change(0) / change(2)).ln() / (2.0 * 1.5_f64.ln());
+    println!("T: order {order:.2}");
+    assert!(order > 2.9);
+}
+
 #[test]
 fn meshing_gives_the_same_bytes_again() {
     let mut corners: Vec<([f64; 2], f64)> =

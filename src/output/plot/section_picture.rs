@@ -42,9 +42,11 @@ struct Frame {
 }
 
 impl Frame {
-    fn new(mesh: &Mesh) -> Self {
+    /// A frame that holds the mesh and all points.
+    fn new(picture: &SectionPicture) -> Self {
         let extent = |axis: usize| {
-            let values = mesh.nodes.iter().map(|node| node[axis]);
+            let points = picture.points.iter().map(|(_, at)| at);
+            let values = picture.mesh.nodes.iter().chain(points).map(|at| at[axis]);
             [values.clone().fold(f64::MAX, f64::min), values.fold(f64::MIN, f64::max)]
         };
         let [[left, right], [bottom, top]] = [extent(0), extent(1)];
@@ -56,6 +58,12 @@ impl Frame {
         (MARGIN + self.scale * (x2 - self.low[0]), 2.0 * MARGIN + self.height - self.scale * (x3 - self.low[1]))
     }
 
+    /// A coordinate with six digits; zero where it is round-off.
+    fn digits(&self, value: f64) -> f64 {
+        let rounded = format!("{value:.5e}").parse().unwrap_or(value);
+        if value.abs() * self.scale < 1e-6 { 0.0 } else { rounded }
+    }
+
     fn text(&self, at: Point) -> String {
         let (x, y) = self.at(at);
         format!("{x:.1} {y:.1}")
@@ -65,7 +73,7 @@ impl Frame {
 impl SectionPicture<'_> {
     /// The text of an SVG file.
     pub fn to_svg(&self) -> String {
-        let frame = Frame::new(self.mesh);
+        let frame = Frame::new(self);
         let legend = self.materials.len() + self.points.len();
         let width = WIDTH + 2.0 * MARGIN;
         let height = frame.height + 3.0 * MARGIN + LINE * legend as f64;
@@ -76,7 +84,7 @@ impl SectionPicture<'_> {
         for material in 0..self.materials.len() {
             svg.filled_path(&self.elements_of(material, &frame), LINES[material % LINES.len()], 0.35);
         }
-        svg.path(&self.sides(&frame), Stroke::solid(BACKGROUND, 0.6));
+        svg.path(&self.sides(&frame), Stroke::solid(BACKGROUND, 0.3));
         let mut y = frame.height + 2.5 * MARGIN;
         for (number, name) in self.materials.iter().enumerate() {
             let square = format!("M{MARGIN:.1} {:.1}h12v12h-12z", y - 11.0);
@@ -88,7 +96,11 @@ impl SectionPicture<'_> {
             let (x, across) = frame.at(*at);
             svg.path(&mark(number, x, across), Stroke::solid(INK, 1.6));
             svg.path(&mark(number, MARGIN + 6.0, y - 5.0), Stroke::solid(INK, 1.6));
-            svg.text(label(&format!("{name} ({:.6}, {:.6})", at[0], at[1]), (MARGIN + 22.0, y), SIZE));
+            svg.text(label(
+                &format!("{name} ({}, {})", frame.digits(at[0]), frame.digits(at[1])),
+                (MARGIN + 22.0, y),
+                SIZE,
+            ));
             y += LINE;
         }
         svg.finish()
