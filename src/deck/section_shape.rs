@@ -662,12 +662,15 @@ fn read_hole<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Outline> {
     }
 }
 
-/// A radius about the origin, or a table of centre and radius.
+/// A radius about the origin, [x2, x3, radius], or a table of centre and radius.
 fn read_circle<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Outline> {
     let is_table = matches!(item.get_ref(), DeValue::Table(_));
     let (centre, radius) = if is_table {
         let table = Table::new(context, item, "`circle`", &CIRCLE_KEYS)?;
         (table.vector_or("centre", [0.0; 2])?, table.required_positive("radius")?)
+    } else if matches!(item.get_ref(), DeValue::Array(_)) {
+        let Spanned { value: [x2, x3, radius], span } = context.vector::<3>(item)?;
+        ([x2, x3], Spanned { value: radius, span })
     } else {
         ([0.0; 2], context.number(item)?)
     };
@@ -715,23 +718,29 @@ fn read_region<'a>(section: &Table<'a>, item: &'a Item<'a>) -> Option<Region> {
 fn read_walls(table: &Table, layups: &[String]) -> Option<Walls> {
     let points = Table::of_names(table.context, table.get("points")?, "`points`")?;
     let points: Vec<_> = points.entries().map(|(name, item)| Some((name, table.context.vector(item)?.value))).collect();
-    let points: Option<Vec<_>> = points.into_iter().collect();
+    let points: Vec<_> = points.into_iter().collect::<Option<_>>()?;
     let item = table.get("walls")?;
     let DeValue::Array(walls) = item.get_ref() else {
         return table.wrong_key("walls", "`walls` is a list of [from, to, thickness or layup]");
     };
     let side = table.word_or("side", SideWord::Middle)?;
-    let walls: Vec<Option<Wall>> = walls.iter().map(|wall| read_wall(table, wall, side, layups)).collect();
+    let walls: Vec<Option<Wall>> = walls.iter().map(|wall| read_wall(table, wall, &points, side, layups)).collect();
     let walls: Vec<Wall> = walls.into_iter().collect::<Option<_>>()?;
     let theta_sense = table.word_or("theta_sense", ThetaSenseWord::Wall)?;
     if walls.iter().any(|wall| matches!(wall.plies, WallPlies::Thickness(_))) {
         table.required("material")?;
     }
-    Some(Walls { points: points?, walls, theta_sense })
+    Some(Walls { points, walls, theta_sense })
 }
 
 /// `["a", "b", 0.002]`, or a table.
-fn read_wall<'a>(section: &Table<'a>, item: &'a Item<'a>, side: SideWord, layups: &[String]) -> Option<Wall> {
+fn read_wall<'a>(
+    section: &Table<'a>,
+    item: &'a Item<'a>,
+    points: &[(Spanned<String>, [f64; 2])],
+    side: SideWord,
+    layups: &[String],
+) -> Option<Wall> {
     let context = section.context;
     let span = item.span();
     if let DeValue::Array(parts) = item.get_ref() {
@@ -753,8 +762,20 @@ fn read_wall<'a>(section: &Table<'a>, item: &'a Item<'a>, side: SideWord, layups
         (Some(_), Some(_)) | (None, None) => table.wrong("a wall needs `thickness` or `layup`"),
     };
     let side = table.word_or("side", side)?;
-    let arc = table.optional("arc", |context, item| context.vector(item));
-    Some(Wall { ends: [from?, to?], plies: plies?, side, arc: arc?.map(|at| at.value), span })
+    let arc = table.optional("arc", |context, item| read_between(context, item, points));
+    Some(Wall { ends: [from?, to?], plies: plies?, side, arc: arc?, span })
+}
+
+/// A point of a round wall: its name or its place.
+fn read_between(context: &Context, item: &Item, points: &[(Spanned<String>, [f64; 2])]) -> Option<[f64; 2]> {
+    if !matches!(item.get_ref(), DeValue::String(_)) {
+        return context.vector(item).map(|at| at.value);
+    }
+    let name = context.text(item)?;
+    match points.iter().find(|(known, _)| known.value == name.value) {
+        Some((_, at)) => Some(*at),
+        None => context.wrong(name.span, format!("the section has no point `{}`", name.value)),
+    }
 }
 
 /// A thickness, or the name of a layup. A text that names no layup is an expression if it can be

@@ -11,6 +11,10 @@ const STEP_BEHIND_WEB: f64 = 1.5;
 /// Points of the profile nearer than this many thicknesses of a web to its middle are left out
 const FREE_AT_WEB: f64 = 1.2;
 
+/// Points of the profile nearer than this many thicknesses of the skin to its end are left out: the
+/// mitre of the closing wall takes about one of them
+const FREE_AT_END: f64 = 2.0;
+
 /// Points of the profile nearer than this part of the chord to an inserted one are left out
 const SAME_PLACE: f64 = 1e-3;
 
@@ -189,7 +193,8 @@ impl Airfoil {
     /// Points of a side up to the end of the skin, with one at each step of the skin and at each
     /// web.
     fn divided(&self, side: &Side, parts: &[SkinPart], end: f64) -> Vec<Point> {
-        let mut inserted: Vec<(f64, f64)> = vec![(end, SAME_PLACE)];
+        let last = plies_at(parts, side.number, end).map_or(0.0, thickness);
+        let mut inserted: Vec<(f64, f64)> = vec![(end, (FREE_AT_END * last / self.chord).max(SAME_PLACE))];
         for part in parts.iter().filter(|part| part.sides[side.number]) {
             inserted.extend(part.ends.map(|x| (x, SAME_PLACE)));
         }
