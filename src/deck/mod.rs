@@ -67,11 +67,11 @@ pub use parameters::Parameters;
 pub use point::PointRef;
 pub use schema::{Entry, SCHEMA, entries, explain, similar};
 pub use scheme::{SchemeName, SchemeWord};
-pub use section::{Section, SectionBody, Shape, ShearFactor};
+pub use section::{Section, SectionBody};
 pub use section_shape::{
     Airfoil, ComputedSection, ComputedShape, Fibre, Flanged, LeadingEdgeWord, MeshAim, Outline, Reference,
-    ReferenceWord, Region, ShapeWord, SideWord, SkinPart, SkinSideWord, ThetaSenseWord, TrailingEdgeWord, Wall,
-    WallPlies, Walls, Web,
+    ReferenceWord, Region, Shape, ShapeWord, ShearFactor, SideWord, SkinPart, SkinSideWord, ThetaSenseWord,
+    TrailingEdgeWord, Wall, WallPlies, Walls, Web,
 };
 pub use shown::{hides_text, shown, shown_in_line};
 pub use spring::{Spring, SpringBody};

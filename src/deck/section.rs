@@ -2,7 +2,7 @@
 
 use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table, joined, kind_of};
-use super::section_shape::{self, ComputedSection};
+use super::section_shape::{self, ComputedSection, ComputedShape, Fibre, Shape, ShearFactor};
 use toml::de::DeValue;
 
 /// `[section.NAME]`
@@ -46,39 +46,6 @@ pub enum SectionBody {
     Computed(Box<ComputedSection>),
 }
 
-/// `shear_factor = …`
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ShearFactor {
-    /// Along 2 and 3
-    Given([f64; 2]),
-    /// That of the energy of Saint-Venant flexure
-    Energy,
-}
-
-/// A cross-section.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// Solid circle
-    Circle {
-        /// Radius
-        radius: f64,
-    },
-    /// Ring
-    Tube {
-        /// Outer radius
-        radius: f64,
-        /// Wall
-        thickness: f64,
-    },
-    /// Solid rectangle
-    Rectangle {
-        /// Along axis 2
-        width: f64,
-        /// Along axis 3
-        height: f64,
-    },
-}
-
 const RESULTANT_KEYS: [&str; 6] = ["EA", "GA", "GJ", "EI", "rhoA", "rhoJ"];
 const FULL_KEYS: [&str; 2] = ["stiffness", "mass"];
 
@@ -101,7 +68,7 @@ pub(super) fn read_section<'a>(
     let body = match (by_resultants, by_matrices, by_shape) {
         (Some(_), None, None) => read_resultants(&table),
         (None, Some(_), None) => read_full(&table),
-        (None, None, Some(_)) => section_shape::read_shaped(&table, layups),
+        (None, None, Some(_)) => section_shape::read_shaped(&table, layups).map(body_of),
         (None, None, None) => table.wrong(format!(
             "{} needs section stiffnesses (EA, GA, GJ, EI), or `stiffness`, or `material` and `shape`",
             table.what
@@ -114,24 +81,21 @@ pub(super) fn read_section<'a>(
     Some(Section { name, body: body? })
 }
 
-/// Two positive numbers, or one for both.
-pub(super) fn read_pair(table: &Table, key: &str) -> Option<[f64; 2]> {
-    let item = table.required(key)?;
-    let values = match item.get_ref() {
-        DeValue::Array(_) => table.context.vector::<2>(item)?,
-        _ => table.context.number(item)?.map(|v| [v, v]),
-    };
-    if values.value.iter().all(|&v| v > 0.0) {
-        return Some(values.value);
+/// Circles, tubes and rectangles as they are, and all other shapes, which are computed.
+fn body_of(section: ComputedSection) -> SectionBody {
+    let ComputedSection { shape, material, reference, turn, mesh, fibre, shear_factor, .. } = &section;
+    let is_plain = reference.is_none() && *turn == 0.0 && mesh.is_none() && *fibre == Fibre::default();
+    if let (ComputedShape::Solid(shape), Some(material), true) = (shape, material, is_plain) {
+        return SectionBody::Shaped { shape: *shape, material: material.clone(), shear_factor: *shear_factor };
     }
-    table.context.wrong(values.span, format!("`{key}` must be positive"))
+    SectionBody::Computed(Box::new(section))
 }
 
 fn read_resultants(table: &Table) -> Option<SectionBody> {
     let extension = table.required_positive("EA");
-    let shear = read_pair(table, "GA");
+    let shear = table.positive_pair("GA");
     let torsion = table.required_positive("GJ");
-    let bending = read_pair(table, "EI");
+    let bending = table.positive_pair("EI");
     let mass = table.non_negative("rhoA");
     let rotary = table.non_negative_vector::<3>("rhoJ");
     let [ga2, ga3] = shear?;

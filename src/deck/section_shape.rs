@@ -2,7 +2,6 @@
 
 use super::diagnostic::{Span, Spanned};
 use super::reader::{Context, Item, Table, joined, kind_of};
-use super::section::{SectionBody, Shape, ShearFactor, read_pair};
 use super::words::{Words, words};
 use toml::de::DeValue;
 
@@ -104,6 +103,39 @@ words! {
         /// The room between the skins behind that is filled
         Fill = "fill",
     }
+}
+
+/// `shear_factor = …`
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShearFactor {
+    /// Along 2 and 3
+    Given([f64; 2]),
+    /// That of the energy of Saint-Venant flexure
+    Energy,
+}
+
+/// A cross-section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// Solid circle
+    Circle {
+        /// Radius
+        radius: f64,
+    },
+    /// Ring
+    Tube {
+        /// Outer radius
+        radius: f64,
+        /// Wall
+        thickness: f64,
+    },
+    /// Solid rectangle
+    Rectangle {
+        /// Along axis 2
+        width: f64,
+        /// Along axis 3
+        height: f64,
+    },
 }
 
 /// A section whose matrices are computed from its shape.
@@ -440,7 +472,7 @@ impl ShapeWord {
 }
 
 /// Reads a section by its shape; `layups` are the names of all layups of the deck.
-pub(super) fn read_shaped(table: &Table, layups: &[String]) -> Option<SectionBody> {
+pub(super) fn read_shaped(table: &Table, layups: &[String]) -> Option<ComputedSection> {
     let shape = table.required("shape");
     let Some(shape) = shape else {
         table.required("material");
@@ -463,10 +495,6 @@ pub(super) fn read_shaped(table: &Table, layups: &[String]) -> Option<SectionBod
     let shape = read_shape(table, kind.value, layups);
     let (material, reference, turn, mesh, shear_factor) = (material?, reference?, turn?, mesh?, shear_factor?);
     let shape = shape?;
-    let is_plain = reference.is_none() && turn.is_none() && mesh.is_none() && !table.has("theta") && !table.has("beta");
-    if let (ComputedShape::Solid(shape), Some(material), true) = (&shape, &material, is_plain) {
-        return Some(SectionBody::Shaped { shape: *shape, material: material.clone(), shear_factor });
-    }
     let turn = turn.map_or(0.0, |turn| turn.value);
     let fibre = fibre?;
     let span = match kind.value {
@@ -484,21 +512,12 @@ pub(super) fn read_shaped(table: &Table, layups: &[String]) -> Option<SectionBod
         | ShapeWord::Box
         | ShapeWord::Regions => kind.span,
     };
-    Some(SectionBody::Computed(Box::new(ComputedSection {
-        shape,
-        span,
-        material,
-        fibre,
-        reference,
-        turn,
-        mesh,
-        shear_factor,
-    })))
+    Some(ComputedSection { shape, span, material, fibre, reference, turn, mesh, shear_factor })
 }
 
 fn read_shear_factor(table: &Table, item: &Item) -> Option<ShearFactor> {
     let is_energy = matches!(item.get_ref(), DeValue::String(word) if word.as_ref() == "energy");
-    if is_energy { Some(ShearFactor::Energy) } else { read_pair(table, "shear_factor").map(ShearFactor::Given) }
+    if is_energy { Some(ShearFactor::Energy) } else { table.positive_pair("shear_factor").map(ShearFactor::Given) }
 }
 
 fn read_fibre(table: &Table) -> Option<Fibre> {

@@ -78,7 +78,7 @@ const ONE_THING: &[(&str, &[&str])] = &[
     ("parameters are read before what may name them", &["src/deck/parameters.rs", "src/deck/reader.rs"]),
     ("motions and loads share histories", &["src/scene/compose/mod.rs", "src/scene/constraints.rs"]),
     ("names are those of the mesh and its sections", &[
-        "src/scene/mesh.rs", "src/scene/names.rs", "src/scene/section.rs",
+        "src/scene/computed.rs", "src/scene/mesh.rs", "src/scene/names.rs", "src/scene/section.rs",
     ]),
     ("one search: the points that it tries, and its rounds", &[
         "src/study/accuracy/candidates.rs", "src/study/accuracy/mod.rs", "src/study/accuracy/round.rs",

@@ -127,7 +127,7 @@ impl fmt::Display for SectionError {
             ),
             Self::TooThin { ratio } => write!(
                 out,
-                "a wall is {ratio:.0} times as long as it is thick: above 3000, round-off spoils the solution. Use a stiffness \
+                "a wall is {ratio:.0} times as long as it is thick: above {MAX_SLENDERNESS}, round-off spoils the solution. Use a stiffness \
                  matrix, or closed forms for thin walls"
             ),
             Self::Meshing { region, message } => write!(out, "no mesh for region `{region}`: {message}"),
@@ -146,6 +146,19 @@ impl fmt::Display for SectionError {
 }
 
 impl std::error::Error for SectionError {}
+
+/// Walls may be this much longer than thick. The condition of the equations grows with the fourth
+/// power; corrections of the solution remove the round-off up to here, but above about 5000 there
+/// is no factorisation.
+const MAX_SLENDERNESS: f64 = 3000.0;
+
+/// Refuses walls that are too thin for double precision.
+pub fn check_slenderness(ratio: f64) -> Result<(), SectionError> {
+    match ratio > MAX_SLENDERNESS {
+        true => Err(SectionError::TooThin { ratio }),
+        false => Ok(()),
+    }
+}
 
 /// Refuses a number that is not positive, or not a number.
 pub fn check_positive(what: impl Into<String>, value: f64) -> Result<(), SectionError> {

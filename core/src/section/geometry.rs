@@ -1,18 +1,13 @@
 //! Shapes of sections: their dimensions, and the mesh of each.
 
 use super::Point;
-use super::error::{self, SectionError};
+use super::error::{self, SectionError, check_slenderness};
 use super::grid::{Fineness, Rect, mesh_rects};
 use super::mesh::{Mesh, Region};
 use super::outline::Outline;
 use super::rings::mesh_ellipse;
 use super::triangulate::{PlanarRegion, mesh_regions};
 use super::walls::{Walls as WallGraph, mesh_walls};
-
-/// Walls may be this much longer than thick. The condition of the equations grows with the fourth
-/// power; corrections of the solution remove the round-off up to here, but above about 5000 there
-/// is no factorisation.
-pub const MAX_SLENDERNESS: f64 = 3000.0;
 
 /// A shape in its own coordinates, then turned and moved.
 #[derive(Clone, Debug, PartialEq)]
@@ -395,12 +390,4 @@ fn rectangle(width: f64, depth: f64, radius: f64) -> Vec<(Point, f64)> {
 /// Refuses lengths that are not positive.
 fn check_positive(lengths: &[(&str, f64)]) -> Result<(), SectionError> {
     lengths.iter().try_for_each(|&(what, value)| error::check_positive(what, value))
-}
-
-/// Refuses walls that are too thin for double precision.
-fn check_slenderness(ratio: f64) -> Result<(), SectionError> {
-    match ratio > MAX_SLENDERNESS {
-        true => Err(SectionError::TooThin { ratio }),
-        false => Ok(()),
-    }
 }

@@ -9,8 +9,7 @@
 use super::Point;
 use super::blocks::{Arc, BlockMesher};
 use super::divide::{End, divide};
-use super::error::{SectionError, check_positive, show};
-use super::geometry::MAX_SLENDERNESS;
+use super::error::{SectionError, check_positive, check_slenderness, show};
 use super::grid::Fineness;
 use super::mesh::{Mesh, ReentrantCorner, Region, Tangent};
 use super::outline::{arc_angles, distance};
@@ -165,9 +164,7 @@ impl Line {
         let thickness = line.thickness();
         check_positive("the length of a wall", length)?;
         check_positive("the thickness of a wall", thickness)?;
-        if length / thickness > MAX_SLENDERNESS {
-            return Err(SectionError::TooThin { ratio: length / thickness });
-        }
+        check_slenderness(length / thickness)?;
         line.tangent = match wall.bend {
             Some(Bend { centre, counterclockwise }) => Tangent::Around { centre, counterclockwise },
             None => {
