@@ -210,8 +210,8 @@ pub struct Section {
     pub stiffness: Vec<Vec<f64>>,
     /// 6x6 mass by rows
     pub mass: Option<Vec<Vec<f64>>>,
-    /// Path of the picture
-    pub picture: Option<String>,
+    /// Paths of the pictures
+    pub pictures: Vec<String>,
 }
 
 /// Prints the numbers of a section.

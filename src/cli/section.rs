@@ -57,11 +57,11 @@ fn all(wanted: &SectionArguments) -> Result<(), CommandError> {
         let solved = scene::solved(section, deck).transpose().map_err(|found| read.refuse(path, &[found]))?;
         let report = Report::new(section, &matrices, solved.as_ref(), &units);
         report.print();
-        let picture = match solved.as_ref().and_then(|solved| solved.solution.as_ref()) {
-            Some(solution) => Some(draw(&report, solution, &folder)?),
-            None => None,
+        let pictures = match solved.as_ref().and_then(|solved| solved.solution.as_ref()) {
+            Some(solution) => draw(&report, solution, &folder)?,
+            None => Vec::new(),
         };
-        json::section(&report.summary(path, picture.as_deref()));
+        json::section(&report.summary(path, &pictures));
     }
     Ok(())
 }
@@ -194,7 +194,7 @@ impl<'a> Report<'a> {
         console::line(&format!("  {name}: ({}, {}){unit}", digits(x2), digits(x3)));
     }
 
-    fn summary(&self, deck: &Path, picture: Option<&Path>) -> json::Section {
+    fn summary(&self, deck: &Path, pictures: &[PathBuf]) -> json::Section {
         let analysis = self.solved.and_then(|solved| solved.solution.as_ref()).map(|solution| &solution.analysis);
         let rows = |matrix: &Matrix6| (0..6).map(|i| (0..6).map(|j| matrix[(i, j)]).collect()).collect();
         let text = |path: &Path| path.display().to_string();
@@ -215,7 +215,7 @@ impl<'a> Report<'a> {
             principal_angle: self.properties.map(|p| p.principal_angle),
             stiffness: rows(&self.stiffness),
             mass: self.mass.as_ref().map(rows),
-            picture: picture.map(text),
+            pictures: pictures.iter().map(|path| text(path)).collect(),
         }
     }
 }
@@ -223,8 +223,8 @@ impl<'a> Report<'a> {
 /// The dimension of mass per length: force · time² / length².
 const MASS_PER_LENGTH: Dimension = Dimension { angle: 0, length: -2, force: 1, time: 2 };
 
-/// Draws a section; gives the path of the picture.
-fn draw(report: &Report, solution: &Solution, folder: &Path) -> Result<PathBuf, CommandError> {
+/// Draws a section; gives the paths of the pictures.
+fn draw(report: &Report, solution: &Solution, folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
     let analysis = &solution.analysis;
     let centres = analysis.properties();
     let mut points = vec![
@@ -236,19 +236,35 @@ fn draw(report: &Report, solution: &Solution, folder: &Path) -> Result<PathBuf, 
     if analysis.solution.mass[(0, 0)] > 0.0 {
         points.push(("mass centre", mass_centre(&analysis.solution.mass)));
     }
-    let picture = SectionPicture {
-        title: format!("section {}: axis 2 to the right, axis 3 upwards", report.name),
+    let name = report.name;
+    let of_materials = SectionPicture {
+        title: format!("section {name}: axis 2 to the right, axis 3 upwards"),
         mesh: &analysis.mesh,
         materials: solution.materials.iter().map(|material| material.name.clone()).collect(),
         points,
+        warping: None,
     };
-    let path = folder.join(format!("{}.svg", file_name(report.name)));
+    let of_warping = SectionPicture {
+        title: format!("section {name}: warping along axis 1 under a torque about it"),
+        points: vec![("shear centre", centres.shear_centre)],
+        materials: Vec::new(),
+        warping: Some(analysis.solution.axial_warping(&analysis.mesh, TORQUE)),
+        ..of_materials
+    };
     outputs::check_folder(folder, &[])?;
-    outputs::check_file(&path, OutputKind::Svg)?;
-    PartFile::write_to(&path, picture.to_svg().as_bytes())?;
-    console::line(&format!("{}", path.display()));
-    Ok(path)
+    let mut paths = Vec::new();
+    for (kind, picture) in [("", of_materials), ("-warping", of_warping)] {
+        let path = folder.join(format!("{}{kind}.svg", file_name(name)));
+        outputs::check_file(&path, OutputKind::Svg)?;
+        PartFile::write_to(&path, picture.to_svg().as_bytes())?;
+        console::line(&format!("{}", path.display()));
+        paths.push(path);
+    }
+    Ok(paths)
 }
+
+/// Number of the resultant M1 among N1 N2 N3 M1 M2 M3
+const TORQUE: usize = 3;
 
 /// The 6x6 mass [m I, -m d~; m d~, J].
 fn mass_matrix(matrices: &SectionMatrices) -> Option<Matrix6> {

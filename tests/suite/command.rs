@@ -300,7 +300,7 @@ fn section_shows_numbers_and_draws() {
     for part in ["section box\n", "nodes", "shear centre: (0.0, 0.0)", "[section.box]\n", "section rod\n"] {
         assert!(text.contains(part), "{part} is not in\n{text}");
     }
-    assert_eq!(folder.names("results/deck"), ["box.svg"]);
+    assert_eq!(folder.names("results/deck"), ["box-warping.svg", "box.svg"]);
     // The printed table is a section again, with the same numbers.
     let start = text.find("[section.box]").unwrap();
     let end = start + text[start..].find("results").unwrap();

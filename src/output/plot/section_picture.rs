@@ -1,4 +1,4 @@
-//! A picture of a section: its mesh, coloured by material, with its centres.
+//! Pictures of a section: its mesh, coloured by material, with its centres, or by its warping.
 
 use super::svg::{Anchor, BACKGROUND, INK, LINES, MUTED, PAPER, Stroke, Svg, Text, Theme};
 use super::text;
@@ -32,6 +32,8 @@ pub struct SectionPicture<'a> {
     pub materials: Vec<String>,
     /// Names and places of points, in the coordinates of the mesh
     pub points: Vec<(&'static str, Point)>,
+    /// Displacement of each node along axis 1 in the place of the materials
+    pub warping: Option<Vec<f64>>,
 }
 
 /// From the coordinates of the mesh to pixels.
@@ -74,19 +76,20 @@ impl SectionPicture<'_> {
     /// The text of an SVG file.
     pub fn to_svg(&self) -> String {
         let frame = Frame::new(self);
-        let legend = self.materials.len() + self.points.len();
+        let legend = self.legend().len() + self.points.len();
         let width = WIDTH + 2.0 * MARGIN;
         let height = frame.height + 3.0 * MARGIN + LINE * legend as f64;
         let mut svg = Svg::new(width, height, &self.title, Theme::OfReader);
         svg.rectangle(0.0, 0.0, width, height, PAPER);
         let title = text::cut(&self.title, 16.0, WIDTH);
         svg.text(label(&title, (MARGIN, MARGIN), 16.0));
-        for material in 0..self.materials.len() {
-            svg.filled_path(&self.elements_of(material, &frame), LINES[material % LINES.len()], 0.35);
+        match &self.warping {
+            Some(warping) => self.draw_warping(warping, &frame, &mut svg),
+            None => self.draw_materials(&frame, &mut svg),
         }
         svg.path(&self.sides(&frame), Stroke::solid(BACKGROUND, 0.3));
         let mut y = frame.height + 2.5 * MARGIN;
-        for (number, name) in self.materials.iter().enumerate() {
+        for (number, name) in self.legend().iter().enumerate() {
             let square = format!("M{MARGIN:.1} {:.1}h12v12h-12z", y - 11.0);
             svg.filled_path(&square, LINES[number % LINES.len()], 0.35);
             svg.text(label(&text::cut(name, SIZE, WIDTH), (MARGIN + 22.0, y), SIZE));
@@ -106,18 +109,42 @@ impl SectionPicture<'_> {
         svg.finish()
     }
 
-    /// The elements of a material as path data, with their curved sides.
-    fn elements_of(&self, material: usize, frame: &Frame) -> String {
-        let mut data = String::new();
-        for element in self.mesh.elements.iter().filter(|e| self.mesh.region(e).material == material) {
-            for side in 0..element.kind.corners() {
-                let [from, middle, to] = self.side(element, side);
-                let begin = if side == 0 { format!("M{}", frame.text(from)) } else { String::new() };
-                let _ = write!(data, "{begin}Q{} {}", frame.text(control(from, middle, to)), frame.text(to));
-            }
-            data.push('z');
+    /// Meanings of colours.
+    fn legend(&self) -> Vec<String> {
+        match self.warping {
+            Some(_) => ["backwards (in the sense of -1)", "forwards (in the sense of +1)"].map(str::to_string).to_vec(),
+            None => self.materials.clone(),
         }
-        data
+    }
+
+    fn draw_materials(&self, frame: &Frame, svg: &mut Svg) {
+        for material in 0..self.materials.len() {
+            let own = self.mesh.elements.iter().filter(|element| self.mesh.region(element).material == material);
+            let data: String = own.map(|element| self.outline_of(element, frame)).collect();
+            svg.filled_path(&data, LINES[material % LINES.len()], 0.35);
+        }
+    }
+
+    /// The more an element is displaced, the stronger is its colour.
+    fn draw_warping(&self, warping: &[f64], frame: &Frame, svg: &mut Svg) {
+        let largest = warping.iter().fold(f64::MIN_POSITIVE, |largest, value| largest.max(value.abs()));
+        for element in &self.mesh.elements {
+            let nodes = element.nodes();
+            let mean = nodes.iter().map(|&node| warping[node as usize]).sum::<f64>() / (nodes.len() as f64 * largest);
+            let colour = LINES[if mean < 0.0 { 0 } else { 1 }];
+            svg.filled_path(&self.outline_of(element, frame), colour, (100.0 * mean.abs()).round() / 100.0);
+        }
+    }
+
+    /// An element as path data, with its curved sides.
+    fn outline_of(&self, element: &Element, frame: &Frame) -> String {
+        let mut data = String::new();
+        for side in 0..element.kind.corners() {
+            let [from, middle, to] = self.side(element, side);
+            let begin = if side == 0 { format!("M{}", frame.text(from)) } else { String::new() };
+            let _ = write!(data, "{begin}Q{} {}", frame.text(control(from, middle, to)), frame.text(to));
+        }
+        data + "z"
     }
 
     /// All sides of elements, each once.
