@@ -73,6 +73,9 @@ impl Side {
     fn height(&self, x: f64) -> f64 {
         let next = self.points.partition_point(|point| point[0] < x).clamp(1, self.points.len() - 1);
         let [from, to] = [self.points[next - 1], self.points[next]];
+        if to[0] <= from[0] {
+            return to[1];
+        }
         let part = ((x - from[0]) / (to[0] - from[0])).clamp(0.0, 1.0);
         from[1] + part * (to[1] - from[1])
     }
@@ -139,7 +142,9 @@ impl Airfoil {
             if points.len() < 2 {
                 return Err(fail("must go from the trailing edge around the leading edge and back".to_string()));
             }
-            if let Some(k) = points.windows(2).position(|pair| pair[1][0] <= pair[0][0]) {
+            // The leading edge may be blunt.
+            let turns = |k: &usize| points[k + 1][0] < points[*k][0] || *k > 0 && points[k + 1][0] == points[*k][0];
+            if let Some(k) = (0..points.len() - 1).find(turns) {
                 let x = points[k + 1][0];
                 return Err(fail(format!(
                     "must go from leading to trailing edge on its {name} side, but turns at {x}"
@@ -216,6 +221,8 @@ impl Airfoil {
 
 /// The plies of a side at a part of the chord: those of the last part that covers it.
 fn plies_at(parts: &[SkinPart], side: usize, x: f64) -> Option<&[Ply]> {
+    // Profiles may reach a little beyond their chord.
+    let x = x.clamp(0.0, 1.0);
     let covers = |part: &&SkinPart| part.sides[side] && part.ends[0] <= x && x <= part.ends[1];
     parts.iter().rev().find(covers).map(|part| &part.plies[..])
 }

@@ -1,5 +1,6 @@
 //! Random outlines and walls: a mesh or an error, never a panic.
 
+use beamsim_core::section::airfoil::{Airfoil, SkinPart, Web};
 use beamsim_core::section::geometry::{Geometry, Shape};
 use beamsim_core::section::mesh::Region;
 use beamsim_core::section::outline::Outline;
@@ -77,4 +78,52 @@ fn random_walls() {
     }
     println!("{outcomes:?}");
     assert!(outcomes["meshed"] > 100);
+}
+
+/// Profiles of four digits (NACA) with skins and webs of random thickness.
+#[test]
+fn random_airfoils() {
+    let mut random = Random(3);
+    let mut outcomes = BTreeMap::new();
+    for _ in 0..300 {
+        let camber = 0.06 * random.next();
+        let thickness = 0.1 + 0.3 * random.next();
+        let count = 10 + random.below(60);
+        let point = |k: usize| {
+            let angle = std::f64::consts::TAU * k as f64 / count as f64;
+            let x = 0.5 + 0.5 * angle.cos();
+            let half = 5.0
+                * thickness
+                * (0.2969 * x.sqrt() - 0.126 * x - 0.3516 * x * x + 0.2843 * x.powi(3) - 0.1036 * x.powi(4));
+            [x, 4.0 * camber * x * (1.0 - x) + if angle.sin() >= 0.0 { half } else { -half }]
+        };
+        let mut plies = |count: usize| {
+            let ply = |thickness: f64| Ply { name: "x".to_string(), material: 0, thickness, theta: 0.0 };
+            (0..count).map(|_| ply(0.0005 + 0.002 * random.next())).collect::<Vec<_>>()
+        };
+        let skin = vec![
+            SkinPart { ends: [0.0, 1.0], sides: [true; 2], plies: plies(2) },
+            SkinPart { ends: [0.2, 0.5], sides: [true; 2], plies: plies(4) },
+        ];
+        let webs = vec![Web { at: 0.2, plies: plies(2) }, Web { at: 0.45, plies: plies(3) }];
+        let airfoil = Airfoil {
+            profile: (0..=count).map(point).collect(),
+            chord: 1.0,
+            pitch_axis: 0.25,
+            leads_to_plus: random.below(2) == 0,
+            skin,
+            webs,
+            fixed_sense: false,
+        };
+        match airfoil.walls() {
+            Ok(walls) => count_mesh(&mut outcomes, walls),
+            Err(error) => *outcomes.entry(format!("{error}")).or_default() += 1,
+        }
+    }
+    println!("{outcomes:?}");
+    assert!(outcomes["meshed"] > 240);
+}
+
+fn count_mesh(outcomes: &mut BTreeMap<String, usize>, walls: Walls) {
+    count(outcomes, &Geometry::new(Shape::Walls(walls)));
 }
