@@ -101,7 +101,7 @@ const EXPLAINED: &[Explained] = &[
     Explained { table: "deck", written: &["name"], help: "use `title`" },
     Explained { table: "deck", written: &["orientation", "orientations", "coordinate_system", "csys", "geom_transf"], help: "use `axis3` of [[beam]], or `axes` of [[support]]" },
     Explained { table: "deck", written: &["frequency", "eigen", "eigenvalue", "natural_frequencies"], help: "use a [[stage]] with kind = \"modal\"" },
-    Explained { table: "material", written: &["yield", "yield_stress", "plasticity", "plastic", "hardening", "strength", "fracture", "elastoplastic"], help: "plasticity is not supported yet: sections are elastic" },
+    Explained { table: "material", written: &["yield", "yield_stress", "plasticity", "plastic", "hardening", "fracture", "elastoplastic"], help: "plasticity is not supported yet: sections are elastic" },
     Explained { table: "material", written: &["viscosity", "damping", "relaxation", "damping_constant", "mu", "loss_factor"], help: "use [damping] for Rayleigh damping; materials are elastic" },
     Explained { table: "material", written: &["alpha", "cte", "expansion", "thermal_expansion", "alpx"], help: "use `free_strain` of [[beam]], such as [\"alpha*dT\", 0, 0, 0, 0, 0]" },
     Explained { table: "material", written: &["type", "kind", "elastic", "name"], help: "materials are linear elastic; their names are in [material.NAME]" },

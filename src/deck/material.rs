@@ -13,6 +13,26 @@ pub struct Material {
     pub elastic: Elastic,
     /// Density, where given
     pub density: Option<f64>,
+    /// Strength, where given
+    pub strength: Option<Strength>,
+    /// Largest strain along the fibre, where given
+    pub strain_limit: Option<f64>,
+}
+
+/// Strength of a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Strength {
+    /// Von Mises stress at yield
+    Yield(f64),
+    /// Strengths in the axes of the material
+    Ply {
+        /// Xt, Yt, Zt
+        tension: [f64; 3],
+        /// Xc, Yc, Zc
+        compression: [f64; 3],
+        /// S12, S13, S23
+        shear: [f64; 3],
+    },
 }
 
 /// Elastic constants of a material.
@@ -43,14 +63,41 @@ pub struct Isotropic {
 }
 
 /// Keys of `[material.NAME]`.
-pub(super) const KEYS: [&str; 4] = ["E", "nu", "G", "rho"];
+pub(super) const KEYS: [&str; 6] = ["E", "nu", "G", "rho", "strength", "strain_limit"];
+
+/// Keys of `strength = {…}`.
+pub(super) const STRENGTH_KEYS: [&str; 9] = ["Xt", "Xc", "Yt", "Yc", "Zt", "Zc", "S12", "S13", "S23"];
 
 pub(super) fn read_material<'a>(context: &'a Context, name: Spanned<String>, item: &'a Item<'a>) -> Option<Material> {
     let table = Table::new(context, item, format!("[material.{}]", name.value), &KEYS)?;
     let density = table.non_negative("rho");
     let is_list = matches!(table.get("E").map(|item| item.get_ref()), Some(DeValue::Array(_)));
     let elastic = if is_list { read_orthotropic(&table) } else { read_isotropic(&table).map(Elastic::Isotropic) };
-    Some(Material { name, elastic: elastic?, density: density.map(|d| d.value) })
+    let strength = table.optional("strength", |_, item| read_strength(&table, item));
+    let strain_limit = table.optional("strain_limit", |_, _| table.positive("strain_limit"));
+    Some(Material {
+        name,
+        elastic: elastic?,
+        density: density.map(|d| d.value),
+        strength: strength?,
+        strain_limit: strain_limit?.map(|limit| limit.value),
+    })
+}
+
+/// A yield stress, or strengths along and across the fibre.
+fn read_strength<'a>(material: &Table<'a>, item: &'a Item<'a>) -> Option<Strength> {
+    if !matches!(item.get_ref(), DeValue::Table(_)) {
+        return material.positive("strength").map(|strength| Strength::Yield(strength.value));
+    }
+    let table = Table::new(material.context, item, "`strength`", &STRENGTH_KEYS)?;
+    let needed = |key: &str| table.required_positive(key).map(|strength| strength.value);
+    let [xt, xc, yt, yc, s12] = ["Xt", "Xc", "Yt", "Yc", "S12"].map(needed);
+    let (yt, yc, s12) = (yt?, yc?, s12?);
+    Some(Strength::Ply {
+        tension: [xt?, yt, table.positive_or("Zt", yt)?],
+        compression: [xc?, yc, table.positive_or("Zc", yc)?],
+        shear: [s12, table.positive_or("S13", s12)?, table.positive_or("S23", s12)?],
+    })
 }
 
 fn read_isotropic(table: &Table) -> Option<Isotropic> {

@@ -58,7 +58,7 @@ pub use initial::{Initial, InitialTarget};
 pub use joint::{Joint, JointMotor, JointParts};
 pub use layup::{Layup, Ply};
 pub use load::{Frame, Load, LoadTarget, LoadVector};
-pub use material::{Elastic, Isotropic, Material};
+pub use material::{Elastic, Isotropic, Material, Strength};
 pub use motion::{Motion, MotionWhat};
 pub use observable::{Looked, looking_at};
 pub use output::Output;

@@ -250,6 +250,7 @@ mod tests {
             ("load", deck::load::KEYS.to_vec()),
             ("load.history", deck::history::USE_KEYS.to_vec()),
             ("material", deck::material::KEYS.to_vec()),
+            ("material.strength", deck::material::STRENGTH_KEYS.to_vec()),
             ("motion", deck::motion::KEYS.to_vec()),
             ("motion.history", deck::history::USE_KEYS.to_vec()),
             ("output", deck::output::KEYS.to_vec()),
