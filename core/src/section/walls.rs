@@ -32,6 +32,10 @@ const SAME_FACE: f64 = 1e-6;
 /// meets
 const SNAP: f64 = 0.05;
 
+/// A step of thickness at a branch is moved along the thinner wall by this many thicknesses of the
+/// branch
+const STEP_BEHIND_BRANCH: f64 = 1.5;
+
 /// Passes in which faces of branches are carried over to branches on the other side
 const MAX_PASSES: usize = 5;
 
@@ -106,19 +110,69 @@ impl Walls {
         });
         self.walls.push(Wall { ends, bend, left, plies: plies.to_vec() });
     }
+
+    /// The lines of the walls, whose regions are numbered ply by ply.
+    fn lines(&self) -> Result<Vec<Line>, SectionError> {
+        let mut lines = Vec::new();
+        let mut regions = 0;
+        for wall in &self.walls {
+            if wall.ends.iter().any(|&end| end >= self.points.len()) {
+                return Err(SectionError::Dimensions { message: "a wall has no end point".to_string() });
+            }
+            lines.push(Line::new(self, wall, regions)?);
+            regions += wall.plies.len();
+        }
+        Ok(lines)
+    }
+
+    /// Walls whose thickness does not change where a third one branches off: the thicker of two
+    /// that go through a joint goes on beyond it.
+    fn with_steps_away_from_branches(&self) -> Result<Self, SectionError> {
+        let lines = self.lines()?;
+        let mut changed = self.clone();
+        for joint in joints(self, &lines)?.iter().filter(|joint| !joint.stems.is_empty()) {
+            let [first, second] = joint.through[..] else { continue };
+            let is_straight = [first, second].iter().all(|end| lines[end.wall].bend.is_none());
+            let [before, after] =
+                [lines[first.wall].faces_away(1 - first.end), lines[second.wall].faces_away(second.end)];
+            let tolerance = SAME_FACE * lines[first.wall].thickness();
+            if !is_straight || before.iter().zip(after).all(|(a, b)| (a - b).abs() <= tolerance) {
+                continue;
+            }
+            let is_first_thicker = lines[first.wall].thickness() >= lines[second.wall].thickness();
+            let (thick, thin) = if is_first_thicker { (first, second) } else { (second, first) };
+            let branch = joint.stems.iter().map(|stem| lines[stem.wall].thickness()).fold(0.0, f64::max);
+            let part = STEP_BEHIND_BRANCH * branch / lines[thin.wall].length();
+            if part < 0.5 {
+                changed.extend_beyond(thick, thin, if thin.end == 0 { part } else { 1.0 - part }, &lines);
+            }
+        }
+        Ok(changed)
+    }
+
+    /// Replaces the plies of a wall between a joint and a part of its length by those of another
+    /// wall at the joint.
+    fn extend_beyond(&mut self, thick: WallEnd, thin: WallEnd, part: f64, lines: &[Line]) {
+        let step = self.points.len();
+        self.points.push(lines[thin.wall].at(part));
+        let mut piece = self.walls[thick.wall].clone();
+        piece.ends = self.walls[thin.wall].ends;
+        piece.ends[1 - thin.end] = step;
+        self.walls[thin.wall].ends[thin.end] = step;
+        if thick.end == thin.end {
+            // The walls run against each other.
+            piece.left = lines[thick.wall].thickness() - piece.left;
+            piece.plies.reverse();
+            piece.plies.iter_mut().for_each(|ply| ply.theta = -ply.theta);
+        }
+        self.walls.push(piece);
+    }
 }
 
 /// Meshes walls.
 pub fn mesh_walls(walls: &Walls, fineness: Fineness) -> Result<Mesh, SectionError> {
-    let mut lines = Vec::new();
-    let mut regions = 0;
-    for wall in &walls.walls {
-        if wall.ends.iter().any(|&end| end >= walls.points.len()) {
-            return Err(SectionError::Dimensions { message: "a wall has no end point".to_string() });
-        }
-        lines.push(Line::new(walls, wall, regions)?);
-        regions += wall.plies.len();
-    }
+    let walls = &walls.with_steps_away_from_branches()?;
+    let lines = walls.lines()?;
     let joints = joints(walls, &lines)?;
     let mut strips = Strips::new(walls, lines, joints)?;
     strips.add_faces()?;
@@ -184,6 +238,12 @@ impl Line {
         if let Some(bend) = &mut self.bend {
             bend.counterclockwise = !bend.counterclockwise;
         }
+    }
+
+    /// Offsets of the outer faces, looking away from an end of the line.
+    fn faces_away(&self, end: usize) -> [f64; 2] {
+        let [left, right] = self.outer_faces();
+        if end == 0 { [left, right] } else { [-right, -left] }
     }
 
     fn thickness(&self) -> f64 {
