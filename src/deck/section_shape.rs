@@ -1,6 +1,6 @@
 //! Shapes of `[section.NAME]`: their dimensions, outlines, regions, walls and skins.
 
-use super::diagnostic::{Span, Spanned};
+use super::diagnostic::{Diagnostic, Span, Spanned};
 use super::reader::{Context, Item, Table, joined, kind_of};
 use super::words::{Words, words};
 use toml::de::DeValue;
@@ -406,6 +406,9 @@ pub struct Web {
     pub span: Span,
 }
 
+/// Most points of an outline, walls or regions of a section.
+const MOST_PARTS: usize = 2000;
+
 /// Keys that all shapes have.
 const COMMON_KEYS: [&str; 5] = ["shape", "material", "reference", "turn", "mesh"];
 
@@ -639,8 +642,19 @@ fn read_points(context: &Context, item: &Item, what: &str) -> Option<Vec<[f64; 2
     if points.len() < 3 {
         return context.wrong(item.span(), format!("{what} needs three or more points, found {}", points.len()));
     }
+    check_count(context, item, points.len())?;
     let points: Vec<Option<[f64; 2]>> = points.iter().map(|at| context.vector(at).map(|at| at.value)).collect();
     points.into_iter().collect()
+}
+
+/// Refuses lists that are too long.
+fn check_count(context: &Context, item: &Item, count: usize) -> Option<()> {
+    if count <= MOST_PARTS {
+        return Some(());
+    }
+    let message = format!("{count} entries are more than the limit of {MOST_PARTS} for a section");
+    context.report(Diagnostic::limit(message, item.span()));
+    None
 }
 
 /// Gives corners the radii of `fillet`: one for all, or one for each.
@@ -710,6 +724,8 @@ fn read_rect(context: &Context, item: &Item) -> Option<Outline> {
 }
 
 fn read_regions(table: &Table) -> Option<Vec<Region>> {
+    let item = table.get("region")?;
+    check_count(table.context, item, table.list("region").len())?;
     let regions: Vec<Option<Region>> = table.list("region").into_iter().map(|item| read_region(table, item)).collect();
     if regions.is_empty() && table.has("region") {
         return table.wrong_key("region", "a section of regions needs at least one [[section.NAME.region]]");
@@ -742,6 +758,7 @@ fn read_walls(table: &Table, layups: &[String]) -> Option<Walls> {
     let DeValue::Array(walls) = item.get_ref() else {
         return table.wrong_key("walls", "`walls` is a list of [from, to, thickness or layup]");
     };
+    check_count(table.context, item, walls.len())?;
     let side = table.word_or("side", SideWord::Middle)?;
     let walls: Vec<Option<Wall>> = walls.iter().map(|wall| read_wall(table, wall, &points, side, layups)).collect();
     let walls: Vec<Wall> = walls.into_iter().collect::<Option<_>>()?;

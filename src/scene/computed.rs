@@ -426,12 +426,13 @@ impl Draft<'_> {
             | SectionError::Dimensions { .. }
             | SectionError::CrossingEdges { .. }
             | SectionError::TooThin { .. }
+            | SectionError::TooLarge { .. }
             | SectionError::Singular
             | SectionError::Interrupted => None,
         };
         let span = span.unwrap_or(self.body.span.clone());
         match error {
-            SectionError::TooThin { .. } => Diagnostic::limit(message, span),
+            SectionError::TooThin { .. } | SectionError::TooLarge { .. } => Diagnostic::limit(message, span),
             SectionError::NotPositiveDefinite { .. }
             | SectionError::PoissonRatio { .. }
             | SectionError::Outline { .. }

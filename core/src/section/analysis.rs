@@ -1,6 +1,6 @@
 //! A section on meshes that become finer until its estimated error meets an aim.
 
-use super::error::SectionError;
+use super::error::{SectionError, check_nodes};
 use super::geometry::Geometry;
 use super::grid::REFINEMENT;
 use super::material::Material;
@@ -17,7 +17,7 @@ pub const DEFAULT_AIM: f64 = 1e-3;
 /// Estimates above this deserve a warning
 pub const POOR_ESTIMATE: f64 = 1e-2;
 
-/// Meshes with more nodes are not tried
+/// Refinement ends before meshes of more nodes
 const MAX_NODES: usize = 60_000;
 
 /// Order of convergence that estimates count on. Smooth sections converge with order 4, corners
@@ -100,6 +100,7 @@ impl Computed {
             return Err(SectionError::Interrupted);
         }
         let mesh = geometry.mesh(level)?;
+        check_nodes(mesh.nodes.len())?;
         let mut solution = solve(&mesh, materials)?;
         if materials.iter().all(Material::is_isotropic) {
             // A mesh need not be as symmetric as its shape.

@@ -70,6 +70,11 @@ pub enum SectionError {
         /// Length over thickness
         ratio: f64,
     },
+    /// A coarse mesh that is already too large
+    TooLarge {
+        /// Its number of nodes
+        nodes: usize,
+    },
     /// The mesh generator failed
     Meshing {
         /// Name of a region
@@ -130,6 +135,11 @@ impl fmt::Display for SectionError {
                 "a wall is {ratio:.0} times as long as it is thick: above {MAX_SLENDERNESS}, round-off spoils the solution. Use a stiffness \
                  matrix, or closed forms for thin walls"
             ),
+            Self::TooLarge { nodes } => write!(
+                out,
+                "a coarse mesh already has {nodes} nodes, more than the limit of {MAX_NODES}: give fewer points, or merge \
+                 plies of one angle"
+            ),
             Self::Meshing { region, message } => write!(out, "no mesh for region `{region}`: {message}"),
             Self::InvertedElement { region, at } => write!(
                 out,
@@ -146,6 +156,17 @@ impl fmt::Display for SectionError {
 }
 
 impl std::error::Error for SectionError {}
+
+/// Most nodes of a mesh
+const MAX_NODES: usize = 100_000;
+
+/// Refuses a mesh that would take minutes.
+pub fn check_nodes(nodes: usize) -> Result<(), SectionError> {
+    match nodes > MAX_NODES {
+        true => Err(SectionError::TooLarge { nodes }),
+        false => Ok(()),
+    }
+}
 
 /// Walls may be this much longer than thick. The condition of the equations grows with the fourth
 /// power; corrections of the solution remove the round-off up to here, but above about 5000 there
