@@ -42,9 +42,9 @@ words! {
     pub enum ReferenceWord {
         /// Centre of the area
         Centroid = "centroid",
-        /// Where a shear force makes no twist
+        /// The point at which a shear force makes no twist
         ShearCentre = "shear_centre",
-        /// Where an axial force makes no curvature
+        /// The point at which an axial force makes no curvature
         TensionCentre = "tension_centre",
         /// Centre of mass
         MassCentre = "mass_centre",

@@ -40,15 +40,15 @@ pub enum Reference {
     Point(Point),
     /// Centre of the area
     Centroid,
-    /// Where an axial force makes no curvature
+    /// The point at which an axial force makes no curvature
     TensionCentre,
-    /// Where a shear force makes no twist
+    /// The point at which a shear force makes no twist
     ShearCentre,
     /// Centre of mass
     MassCentre,
 }
 
-/// What deserves a warning.
+/// A reason to warn of a computed section.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SectionWarning {
     /// The estimated error of the stiffness is large
@@ -78,7 +78,7 @@ pub struct Analysis {
     pub level: usize,
 }
 
-/// What a mesh aims at.
+/// The aim of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MeshAim {
     /// Estimated error of the stiffness, relative to the root of the products of diagonals
@@ -198,7 +198,7 @@ impl Analysis {
         load_about_origin(resultants, at)
     }
 
-    /// What deserves a warning.
+    /// Reasons to warn of the section.
     pub fn warnings(&self) -> Vec<SectionWarning> {
         let estimate = self.estimate;
         let mut warnings = Vec::new();

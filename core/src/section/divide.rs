@@ -1,6 +1,6 @@
 //! Division of a line into cells, fine towards its ends where the solution asks for it.
 
-/// What the solution does at an end of a line.
+/// The behaviour of the solution at an end of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum End {
     /// Nothing special

@@ -20,7 +20,7 @@ pub enum SectionError {
     },
     /// A number that has to be positive
     NotPositive {
-        /// What the number is
+        /// Meaning of the number
         what: String,
         /// Its value
         value: f64,
@@ -41,7 +41,7 @@ pub enum SectionError {
     Outline {
         /// Name of the region
         region: String,
-        /// What is wrong
+        /// The fault
         message: String,
     },
     /// A region that contains no element, because others cover it
@@ -79,7 +79,7 @@ pub enum SectionError {
     Meshing {
         /// Name of a region
         region: String,
-        /// What happened
+        /// The reason
         message: String,
     },
     /// An element with a wrong side out

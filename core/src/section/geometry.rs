@@ -16,7 +16,7 @@ pub struct Geometry {
     pub shape: Shape,
     /// Turn about the origin of the shape from axis 2 towards axis 3, rad
     pub turn: f64,
-    /// Where the origin of the shape comes to lie
+    /// Place of the origin of the shape
     pub shift: Point,
 }
 

@@ -22,7 +22,7 @@ pub struct Rect {
     pub region: usize,
 }
 
-/// How fine cells are.
+/// Numbers of cells along a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fineness {
     /// Cells of a line with nothing special at its ends
@@ -167,7 +167,7 @@ impl Grid {
         thinnest
     }
 
-    /// What happens at an end of a column of cells: `line` is the line there, `k` the column.
+    /// The behaviour of the solution at an end of a column of cells: `line` is the line there, `k` the column.
     fn end(&self, axis: usize, k: usize, line: usize, half_length: f64) -> End {
         let across = 1 - axis;
         let corner_on_line = (0..self.lines[across].len() as isize).any(|other| {

@@ -24,7 +24,7 @@ pub struct Material {
 /// Elastic constants. Orthotropic materials have axes 1 (fibre), 2 (in the ply) and 3 (normal).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Elastic {
-    /// The same in all directions
+    /// Equal in all directions
     Isotropic {
         /// Young's modulus
         e: f64,

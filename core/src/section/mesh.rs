@@ -28,7 +28,7 @@ impl Region {
 /// The direction of a wall in the section.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tangent {
-    /// The same everywhere: angle from axis 2 towards axis 3, rad
+    /// A constant direction: angle from axis 2 towards axis 3, rad
     Fixed(f64),
     /// Along circles about a centre, from axis 2 towards axis 3 if `counterclockwise`
     Around {

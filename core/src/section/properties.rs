@@ -1,4 +1,4 @@
-//! What follows from the 6x6 matrices: centres, torsional stiffness, principal axes, and a change
+//! Results from the 6x6 matrices: centres, torsional stiffness, principal axes, and a change
 //! of reference point or axes.
 
 use super::{Matrix6, Point, Vector6};
@@ -14,9 +14,9 @@ pub struct Properties {
     pub gj: f64,
     /// Shear stiffness along 2 and 3 of forces through the shear centre, with free curvature
     pub ga: [f64; 2],
-    /// Where a shear force makes no twist
+    /// The point at which a shear force makes no twist
     pub shear_centre: Point,
-    /// Where an axial force makes no curvature
+    /// The point at which an axial force makes no curvature
     pub tension_centre: Point,
     /// Larger and smaller bending stiffness, with free twist and extension
     pub ei: [f64; 2],

@@ -1,4 +1,4 @@
-//! How near a stress is to the strength of a material.
+//! Failure indices: the stress relative to the strength of a material.
 //!
 //! All measures are strength ratios inverted: 1 at failure, and proportional to the load.
 

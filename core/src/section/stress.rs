@@ -15,7 +15,7 @@ use std::collections::HashMap;
 /// Steps of Newton's method for the place of a point in an element
 const MAX_STEPS: usize = 20;
 
-/// How far outside an element, in its reference coordinates, a point may be
+/// Largest distance of a point outside an element, in its reference coordinates
 const INSIDE_TOLERANCE: f64 = 1e-6;
 
 /// Unit stresses of each node and region.
@@ -43,13 +43,13 @@ pub struct Place {
 pub struct Peak {
     /// The value
     pub value: f64,
-    /// Where it is
+    /// Its place
     pub at: Point,
     /// Index of the region
     pub region: usize,
 }
 
-/// Whether the largest stress is also searched near re-entrant corners, where it is infinite and a
+/// The search for the largest stress near re-entrant corners, where it is infinite and a
 /// mesh only shows how fine it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Corners {

@@ -562,7 +562,7 @@ fn owners(
     }
 }
 
-/// How often the outlines of each region go around a point, holes clockwise: 1 inside, 0 outside.
+/// Winding numbers of the outlines of each region about a point, holes clockwise: 1 inside, 0 outside.
 fn windings(at: Point, regions: usize, chords: &Chords) -> Vec<i32> {
     let mut winding = vec![0_i32; regions];
     for (region, polygon) in &chords.polygons {

@@ -384,7 +384,7 @@ struct Station {
     stems: Vec<(WallEnd, usize)>,
 }
 
-/// How the end of a stem meets the walls that go through a joint.
+/// The meeting of the end of a stem with the walls that go through a joint.
 struct Butt {
     stem: WallEnd,
     /// Offset of the face of the walls against which it butts
@@ -405,7 +405,7 @@ struct Strips {
     /// Faces of each chain, descending
     faces: Vec<Vec<f64>>,
     stations: Vec<Vec<Station>>,
-    /// Whether there are re-entrant corners at the left and the right face of each chain
+    /// True where a chain has re-entrant corners at its left face, and at its right one
     is_singular: Vec<[bool; 2]>,
     regions: Vec<Region>,
 }
@@ -594,7 +594,7 @@ impl Strips {
         is_inside && !is_taken
     }
 
-    /// Where and how a stem meets the walls that go through a joint.
+    /// The meeting of a stem with the walls that go through a joint.
     fn butt(&self, joint: usize, stem: WallEnd) -> Result<Butt, SectionError> {
         let face = self.butt_face(joint, stem)?;
         let along = self.lines[stem.wall].tangent_at(stem.end as f64);
@@ -780,7 +780,7 @@ impl Strips {
         divide(thickness, ends.map(|singular| end(singular, count)), least, fineness.density)
     }
 
-    /// Whether there are re-entrant corners at the left and the right face of each chain.
+    /// True where a chain has re-entrant corners at its left face, and at its right one.
     fn singular_faces(&self) -> Vec<[bool; 2]> {
         let mut singular = vec![[false; 2]; self.faces.len()];
         for (joint, known) in self.joints.iter().enumerate() {
@@ -802,7 +802,7 @@ impl Strips {
         singular
     }
 
-    /// What happens at an end of a stretch.
+    /// The behaviour of the solution at an end of a stretch.
     fn end(&self, wall: usize, station: &Station, end: usize, length: f64) -> End {
         let line = &self.lines[wall];
         let thickness = line.thickness();
@@ -910,7 +910,7 @@ struct Vertices {
     known: HashMap<VertexKey, u32>,
 }
 
-/// What a vertex belongs to.
+/// The place of a vertex among walls.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum VertexKey {
     /// The mitre of a joint, at a face of the chain through it
