@@ -62,6 +62,8 @@ pub mod integrate;
 
 pub mod solve;
 
+pub mod section;
+
 pub mod run;
 
 pub mod probe;

@@ -117,6 +117,8 @@ warning_kinds! {
     HistoryKinks: "history_kinks", Deck;
     /// An element turns far from node to node.
     CoarseMesh: "coarse_mesh", Mesh;
+    /// The estimated error of a computed section is large, or larger than `mesh` asks for.
+    CoarseSection: "coarse_section", Mesh;
     /// Curvatures depend on the orientation of the scene.
     FrameDependence: "frame_dependence", Mesh;
     /// Round-off takes most digits of the displacements.

@@ -6,7 +6,7 @@ use super::status::Status;
 use super::thread_count::{on_threads, threads_of};
 use super::verdict::Verdict;
 use super::{console, json, load};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{self, Mesh, Scene};
 use crate::study::forecast::{Forecast, forecast};
 use beamsim_core::model::beam_element::{ElementGeometry, Rule};
 use beamsim_core::model::{Assembly, EffectSize, Schedule, SectionMatrices};
@@ -36,6 +36,7 @@ fn one(path: &Path, settings: &[String]) -> Result<(), CommandError> {
     let reading = begun.elapsed();
     let title = loaded.scene.title.as_deref().unwrap_or("(no title)");
     console::line(&format!("{}: {title}", path.display()));
+    print_computed_sections(&loaded);
     print_scene(&loaded.scene).map_err(CommandError::Run)?;
     let seconds = print_time(&loaded, reading).map_err(|failure| {
         print_hint(&failure, &loaded.scene);
@@ -43,6 +44,22 @@ fn one(path: &Path, settings: &[String]) -> Result<(), CommandError> {
     })?;
     json::check(path, &loaded.scene, seconds);
     Ok(())
+}
+
+/// Prints a line for each section of beams that is computed from its shape.
+fn print_computed_sections(loaded: &Loaded) {
+    let deck = &loaded.deck;
+    let is_used = |name: &str| deck.beams.iter().any(|beam| beam.sections.iter().any(|own| own.value == name));
+    for section in deck.sections.iter().filter(|section| is_used(&section.name.value)) {
+        let Some(Ok(solved)) = scene::solved(section, deck) else { continue };
+        let Some(solution) = solved.solution else { continue };
+        console::line(&format!(
+            "section {}: computed with {} nodes, estimated relative error {:.1e}; more by `beamsim section`",
+            section.name.value,
+            solution.analysis.mesh.nodes.len(),
+            solution.analysis.estimate
+        ));
+    }
 }
 
 fn print_scene(scene: &Scene) -> Result<(), Failure> {

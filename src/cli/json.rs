@@ -175,6 +175,50 @@ pub fn sweep(table: &Path, points: usize, finished: usize, failed: &BTreeMap<&st
     print("sweep", Sweep { table: text(table), points, finished, failed });
 }
 
+/// The numbers of a section.
+#[derive(Serialize)]
+pub struct Section {
+    /// Path of the deck
+    pub deck: String,
+    /// Name of the section
+    pub section: String,
+    /// Nodes of the mesh of a computed section
+    pub nodes: Option<usize>,
+    /// Estimated relative error of a computed stiffness
+    pub estimate: Option<f64>,
+    /// Area of a computed section
+    pub area: Option<f64>,
+    /// The point of the shape through which the line of the beam goes
+    pub line: Option<[f64; 2]>,
+    /// Tension centre from the line of the beam
+    pub tension_centre: Option<[f64; 2]>,
+    /// Shear centre from the line of the beam
+    pub shear_centre: Option<[f64; 2]>,
+    /// Mass centre from the line of the beam
+    pub mass_centre: Option<[f64; 2]>,
+    /// 1/S11 about the tension centre
+    pub ea: Option<f64>,
+    /// 1/S22 and 1/S33 about the shear centre
+    pub ga: Option<[f64; 2]>,
+    /// 1/S44
+    pub gj: Option<f64>,
+    /// Larger and smaller bending stiffness
+    pub ei: Option<[f64; 2]>,
+    /// Angle from axis 2 to the axis of the larger bending stiffness, rad
+    pub principal_angle: Option<f64>,
+    /// 6x6 stiffness by rows
+    pub stiffness: Vec<Vec<f64>>,
+    /// 6x6 mass by rows
+    pub mass: Option<Vec<Vec<f64>>>,
+    /// Paths of the pictures
+    pub pictures: Vec<String>,
+}
+
+/// Prints the numbers of a section.
+pub fn section(summary: &Section) {
+    print("section", summary);
+}
+
 #[derive(Serialize)]
 struct Wrote {
     file: String,

@@ -43,28 +43,10 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, CommandError> {
 
 /// Reads the text of a deck that comes from a file, and builds its scene.
 pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, CommandError> {
-    let text = deck::apply(own, settings).map_err(CommandError::deck)?;
-    // Settings may have moved lines.
-    let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
-    let label = format!("{}{changed}", path.display());
-    let refuse = |text: &str, found: &[Diagnostic], expected: Vec<String>| {
-        if SweepFile::is_one(text) {
-            return sweep_as_deck(path);
-        }
-        let errors: Vec<_> = found.iter().filter(|d| !d.is_warning()).collect();
-        CommandError::Deck(DeckError {
-            message: count_of_errors(errors.len(), path),
-            details: render(&label, text, found),
-            fault: fault(&errors),
-            expected,
-        })
-    };
-    let own = text;
-    let imported = deck::import(&own, &|name| beside(path, name));
-    let Imported { text, tables } = imported.map_err(|found| refuse(&own, &found, Vec::new()))?;
-    let (deck, found) = deck::read(&text).map_err(|found| refuse(&text, &found, Vec::new()))?;
+    let ReadDeck { own, imported: Imported { text, tables }, label, deck, found } = read(path, own, settings)?;
     let built = scene::from_deck(&deck, found);
-    let (scene, warnings) = built.map_err(|found| refuse(&text, &found, expected_failures(&deck)))?;
+    let refuse = |found: Vec<Diagnostic>| refusal(path, &label, &text, &found, expected_failures(&deck));
+    let (scene, warnings) = built.map_err(refuse)?;
     if !warnings.is_empty() && console::denies_warnings() {
         let (count, path) = (warnings.len(), path.display());
         return Err(CommandError::Deck(DeckError {
@@ -79,6 +61,54 @@ pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Comm
     }
     let source = source(path, &own, &text, tables);
     Ok(Loaded { text, source, deck, scene })
+}
+
+/// A deck without its scene.
+pub struct ReadDeck {
+    /// Its text with the settings of the command line
+    own: String,
+    /// The text with the rows of imported tables
+    imported: Imported,
+    /// Its name in messages
+    label: String,
+    /// The deck as it stands in the text
+    pub deck: Deck,
+    /// Messages about it
+    pub found: Vec<Diagnostic>,
+}
+
+impl ReadDeck {
+    /// The error that shows messages about the deck.
+    pub fn refuse(&self, path: &Path, found: &[Diagnostic]) -> CommandError {
+        refusal(path, &self.label, &self.imported.text, found, Vec::new())
+    }
+}
+
+/// Reads a deck without building its scene.
+pub fn read(path: &Path, own: &str, settings: &[String]) -> Result<ReadDeck, CommandError> {
+    let own = deck::apply(own, settings).map_err(CommandError::deck)?;
+    // Settings may have moved lines.
+    let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
+    let label = format!("{}{changed}", path.display());
+    let imported = deck::import(&own, &|name| beside(path, name));
+    let imported = imported.map_err(|found| refusal(path, &label, &own, &found, Vec::new()))?;
+    let read = deck::read(&imported.text);
+    let (deck, found) = read.map_err(|found| refusal(path, &label, &imported.text, &found, Vec::new()))?;
+    Ok(ReadDeck { own, imported, label, deck, found })
+}
+
+/// The error of a deck with the messages about it.
+fn refusal(path: &Path, label: &str, text: &str, found: &[Diagnostic], expected: Vec<String>) -> CommandError {
+    if SweepFile::is_one(text) {
+        return sweep_as_deck(path);
+    }
+    let errors: Vec<_> = found.iter().filter(|d| !d.is_warning()).collect();
+    CommandError::Deck(DeckError {
+        message: count_of_errors(errors.len(), path),
+        details: render(label, text, found),
+        fault: fault(&errors),
+        expected,
+    })
 }
 
 /// What run.json keeps of a deck: its text with the rows of short tables, and where long ones are.

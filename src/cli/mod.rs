@@ -21,6 +21,7 @@ mod report;
 mod restart;
 mod run;
 mod schema;
+mod section;
 mod signals;
 mod simulate;
 mod status;
@@ -133,6 +134,15 @@ enum Command {
         #[command(flatten)]
         wanted: plot::PlotArguments,
     },
+    /// Show the properties of sections (stiffness, mass, centres), and draw those that are computed from
+    /// their shape
+    #[command(
+        after_help = "Examples:\n  beamsim section frame.toml\n  beamsim section blade.toml root --set section.root.mesh=1e-5"
+    )]
+    Section {
+        #[command(flatten)]
+        wanted: section::SectionArguments,
+    },
     /// Write a page for a browser that plays a run back, with its histories, energies, effects and deck
     #[command(after_help = "Example:\n  beamsim report results/arm")]
     Report {
@@ -219,6 +229,7 @@ pub fn main() -> ExitCode {
         Command::Compare { a, b, rtol, atol } => compare::compare(&a, &b, rtol, atol),
         Command::Cost { input, wanted, out } => cost::cost(&input.decks, &input.set, &wanted, out.as_deref()),
         Command::Plot { wanted } => plot::plot(&wanted),
+        Command::Section { wanted } => section::section(&wanted),
         Command::Report { folders, out } => report::report(&folders, out.as_deref()),
         Command::Effects { input, tolerance, out } => {
             effects::effects(&input.decks, &input.set, tolerance, out.as_deref())

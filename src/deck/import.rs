@@ -4,7 +4,7 @@
 use super::beam::StationsWord;
 use super::diagnostic::Severity;
 use super::{Diagnostic, Words};
-use toml_edit::{Array, DocumentMut, Item, Table, Value};
+use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Rows of a table, at most.
@@ -65,6 +65,7 @@ pub fn import_up_to(most_rows: usize, text: &str, open: Open) -> Result<Imported
     let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(unchanged()) };
     let mut importer = Importer { text, open, most_rows, found: Vec::new(), sections: Vec::new(), tables: Vec::new() };
     importer.beams(&mut document);
+    importer.outlines(&mut document);
     importer.histories(&mut document);
     let Importer { found, sections, tables, .. } = importer;
     if !found.is_empty() {
@@ -116,6 +117,41 @@ impl Importer<'_> {
                 beam.insert("stations", Item::Value(stations.into_iter().collect::<Array>().into()));
                 beam.insert("stations_in", Item::Value(unit.word().into()));
                 self.sections.extend(names.into_iter().zip(sections.into_iter().map(Item::Table)));
+            }
+        }
+    }
+
+    /// Outlines, holes and profiles of sections, and those of their regions.
+    fn outlines(&mut self, document: &mut DocumentMut) {
+        let Some(sections) = document.get_mut("section").and_then(Item::as_table_like_mut) else { return };
+        for (_, section) in sections.iter_mut() {
+            let Some(section) = section.as_table_like_mut() else { continue };
+            self.outlines_of(section);
+            let Some(regions) = section.get_mut("region") else { continue };
+            if let Some(regions) = regions.as_array_of_tables_mut() {
+                regions.iter_mut().for_each(|region| self.outlines_of(region));
+            } else if let Some(regions) = regions.as_array_mut() {
+                let tables = regions.iter_mut().filter_map(Value::as_inline_table_mut);
+                tables.for_each(|region| self.outlines_of(region));
+            }
+        }
+    }
+
+    fn outlines_of(&mut self, table: &mut dyn TableLike) {
+        for key in ["outline", "profile"] {
+            if let Some(path) = named(table.get(key))
+                && let Some(points) = self.table(&path, Csv::points_of_plane)
+            {
+                table.insert(key, Item::Value(points.into()));
+            }
+        }
+        let holes = table.get_mut("holes").and_then(Item::as_array_mut);
+        for hole in holes.into_iter().flat_map(Array::iter_mut) {
+            let path = hole.as_inline_table().and_then(|table| table.get("csv")?.as_str());
+            if let Some(path) = path.map(str::to_string)
+                && let Some(points) = self.table(&path, Csv::points_of_plane)
+            {
+                *hole = points.into();
             }
         }
     }
@@ -251,6 +287,21 @@ impl Csv {
             _ => return Err("a table of points needs the columns `x`, `y`, `z`".into()),
         };
         let point = |row: &Vec<f64>| Value::from(places.iter().map(|&k| row[k]).collect::<Array>());
+        Ok(self.rows.iter().map(point).collect())
+    }
+
+    /// Columns `x2`, `x3`, or `x`, `y`, or two without these names.
+    fn points_of_plane(&self) -> Result<Array, String> {
+        let of_names = |names: [&str; 2]| {
+            let [first, second] = names.map(|name| self.place(name));
+            first.zip(second)
+        };
+        let (first, second) = match of_names(["x2", "x3"]).or(of_names(["x", "y"])) {
+            Some(places) => places,
+            None if self.width() == 2 => (0, 1),
+            None => return Err("a table of an outline needs the columns `x2`, `x3`".into()),
+        };
+        let point = |row: &Vec<f64>| Value::from([row[first], row[second]].into_iter().collect::<Array>());
         Ok(self.rows.iter().map(point).collect())
     }
 
@@ -420,6 +471,12 @@ mod tests {
         assert!(history.contains("times = [0.0, 1.0]\nvalues = [1.0, 3.0]") && !history.contains("csv"), "{history}");
         let turned = with("[history.h]\ncsv = \"f.csv\"\n", "F,time\n5,0\n6,1\n").unwrap();
         assert!(turned.contains("times = [0.0, 1.0]\nvalues = [5.0, 6.0]"), "{turned}");
+        let outline =
+            with("[section.s]\noutline = { csv = \"o.csv\" }\nholes = [{ csv = \"h.csv\" }]\n", "x2,x3\n0,1\n");
+        let outline = outline.unwrap();
+        assert!(outline.contains("outline = [[0.0, 1.0]]\nholes = [[[0.0, 1.0]]]"), "{outline}");
+        let region = with("[[section.s.region]]\noutline = { csv = \"o.csv\" }\n", "0,1\n2,3\n").unwrap();
+        assert!(region.contains("outline = [[0.0, 1.0], [2.0, 3.0]]"), "{region}");
         let section = "[[beam]]\nname = \"b\"\nsection = { csv = \"s.csv\" }\n";
         for wrong in ["s,C11,rhoA\n0,1,1\n1,1,1\n", "s,EA,rhoJ2\n0,1,1\n1,1,1\n", "s,EA\n0,1\n", "s,EB\n0,1\n1,1\n"] {
             assert!(with(section, wrong).is_err(), "{wrong}");

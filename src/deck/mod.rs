@@ -19,6 +19,7 @@ mod history;
 mod import;
 mod initial;
 mod joint;
+mod layup;
 mod load;
 mod material;
 mod motion;
@@ -32,6 +33,7 @@ mod resolved;
 mod schema;
 mod scheme;
 mod section;
+mod section_shape;
 mod shown;
 mod spring;
 mod stage;
@@ -54,8 +56,9 @@ pub use history::{HistoryBody, HistoryTable, HistoryUse};
 pub use import::{Imported, ImportedTable, Unreadable, fingerprint, import, import_up_to};
 pub use initial::{Initial, InitialTarget};
 pub use joint::{Joint, JointMotor, JointParts};
+pub use layup::{Layup, Ply};
 pub use load::{Frame, Load, LoadTarget, LoadVector};
-pub use material::Material;
+pub use material::{Elastic, Isotropic, Material, Strength};
 pub use motion::{Motion, MotionWhat};
 pub use observable::{Looked, looking_at};
 pub use output::Output;
@@ -64,7 +67,12 @@ pub use parameters::Parameters;
 pub use point::PointRef;
 pub use schema::{Entry, SCHEMA, entries, explain, similar};
 pub use scheme::{SchemeName, SchemeWord};
-pub use section::{Section, SectionBody, Shape};
+pub use section::{Section, SectionBody};
+pub use section_shape::{
+    Airfoil, ComputedSection, ComputedShape, Fibre, Flanged, LeadingEdgeWord, MeshAim, Outline, Reference,
+    ReferenceWord, Region, Shape, ShapeWord, ShearFactor, SideWord, SkinPart, SkinSideWord, ThetaSenseWord,
+    TrailingEdgeWord, Wall, WallPlies, Walls, Web,
+};
 pub use shown::{hides_text, shown, shown_in_line};
 pub use spring::{Spring, SpringBody};
 pub use stage::{MOST_STEPS, RotatingFrame, STEP_TOLERANCE, Stage, StageBody, Until};
@@ -89,6 +97,8 @@ pub struct Deck {
     pub points: Vec<(Spanned<String>, [f64; 3])>,
     /// Materials
     pub materials: Vec<Material>,
+    /// Plies of walls
+    pub layups: Vec<Layup>,
     /// Sections
     pub sections: Vec<Section>,
     /// Beams
@@ -134,9 +144,10 @@ pub struct Deck {
 }
 
 /// Keys of a deck.
-const KEYS: [&str; 23] = [
-    "title", "units", "gravity", "param", "point", "material", "section", "beam", "support", "motion", "joint", "body",
-    "spring", "load", "initial", "history", "stage", "effects", "output", "cost", "accuracy", "damping", "expect",
+const KEYS: [&str; 24] = [
+    "title", "units", "gravity", "param", "point", "material", "layup", "section", "beam", "support", "motion",
+    "joint", "body", "spring", "load", "initial", "history", "stage", "effects", "output", "cost", "accuracy",
+    "damping", "expect",
 ];
 
 /// Reads a deck. Errors and warnings are returned beside it, so that the scene can add its own;
@@ -206,7 +217,10 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
     let top = Table::top(context, document, "the deck", &KEYS);
     let points = point::read_points(&top);
     let materials = named(&top, "material", material::read_material);
-    let sections = named(&top, "section", section::read_section);
+    let layups = named(&top, "layup", layup::read_layup);
+    let layup_names = names_below(&top, "layup");
+    let sections =
+        named(&top, "section", |context, name, item| section::read_section(context, name, item, &layup_names));
     let beams = listed(&top, "beam", beam::read_beam);
     let joints = listed(&top, "joint", joint::read_joint);
     let bodies = listed(&top, "body", body::read_body);
@@ -214,6 +228,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
     let read: Vec<&str> = [
         points.iter().map(|(name, _)| name.value.as_str()).collect::<Vec<_>>(),
         materials.iter().map(|m| m.name.value.as_str()).collect(),
+        layups.iter().map(|l| l.name.value.as_str()).collect(),
         sections.iter().map(|s| s.name.value.as_str()).collect(),
         beams.iter().map(|b| b.name.value.as_str()).collect(),
         histories.iter().map(|h| h.name.value.as_str()).collect(),
@@ -229,6 +244,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         gravity: read_gravity(&top),
         points,
         materials,
+        layups,
         sections,
         beams,
         supports: listed(&top, "support", support::read_support),
@@ -253,10 +269,16 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
     deck
 }
 
+/// The names of `[key.NAME]` tables.
+fn names_below(top: &Table, key: &str) -> Vec<String> {
+    let tables = top.get(key).and_then(|item| item.get_ref().as_table());
+    tables.map_or(Vec::new(), |tables| tables.keys().map(|name| name.get_ref().to_string()).collect())
+}
+
 /// Every name that the text defines, also those of tables that cannot be read.
 fn defined_names(document: &DeTable) -> Vec<String> {
     let table = |key: &str| document.get(key).and_then(|item| item.get_ref().as_table());
-    let named = ["point", "material", "section", "history"].into_iter().filter_map(table);
+    let named = ["point", "material", "layup", "section", "history"].into_iter().filter_map(table);
     let mut names: Vec<String> = named.flat_map(|t| t.keys().map(|k| k.get_ref().to_string())).collect();
     if let Some(DeValue::Array(beams)) = document.get("beam").map(|item| item.get_ref()) {
         let name = |beam: &reader::Item| Some(beam.get_ref().as_table()?.get("name")?.get_ref().as_str()?.to_string());

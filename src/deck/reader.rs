@@ -356,6 +356,19 @@ impl<'a> Table<'a> {
         Some(self.optional(key, |_, _| self.positive(key))?.map_or(default, |number| number.value))
     }
 
+    /// Two positive numbers that must be there, or one for both.
+    pub fn positive_pair(&self, key: &str) -> Option<[f64; 2]> {
+        let item = self.required(key)?;
+        let values = match item.get_ref() {
+            DeValue::Array(_) => self.context.vector::<2>(item)?,
+            _ => self.context.number(item)?.map(|value| [value, value]),
+        };
+        if values.value.iter().all(|&value| value > 0.0) {
+            return Some(values.value);
+        }
+        self.context.wrong(values.span, format!("`{key}` must be positive"))
+    }
+
     /// A number that is not negative.
     pub fn non_negative(&self, key: &str) -> Option<Spanned<f64>> {
         let number = self.number(key)?;

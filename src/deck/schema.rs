@@ -246,13 +246,23 @@ mod tests {
             ("initial", deck::initial::KEYS.to_vec()),
             ("joint", deck::joint::KEYS.to_vec()),
             ("joint.history", deck::history::USE_KEYS.to_vec()),
+            ("layup", deck::layup::KEYS.to_vec()),
             ("load", deck::load::KEYS.to_vec()),
             ("load.history", deck::history::USE_KEYS.to_vec()),
             ("material", deck::material::KEYS.to_vec()),
+            ("material.strength", deck::material::STRENGTH_KEYS.to_vec()),
             ("motion", deck::motion::KEYS.to_vec()),
             ("motion.history", deck::history::USE_KEYS.to_vec()),
             ("output", deck::output::KEYS.to_vec()),
             ("section", deck::section::KEYS.to_vec()),
+            ("section.mesh", deck::section_shape::MESH_KEYS.to_vec()),
+            ("section.outline", vec!["csv"]),
+            ("section.profile", vec!["csv"]),
+            ("section.region", deck::section_shape::REGION_KEYS.to_vec()),
+            ("section.region.circle", deck::section_shape::CIRCLE_KEYS.to_vec()),
+            ("section.region.outline", vec!["csv"]),
+            ("section.skin", deck::section_shape::SKIN_KEYS.to_vec()),
+            ("section.webs", deck::section_shape::WEB_KEYS.to_vec()),
             ("spring", deck::spring::KEYS.to_vec()),
             ("stage", deck::stage::KEYS.to_vec()),
             ("stage.frame", deck::stage::FRAME_KEYS.to_vec()),
@@ -280,7 +290,13 @@ mod tests {
             ("expect.warns", warnings.chain(["false".to_string()]).collect()),
             ("joint.kind", words::<JointKind>()),
             ("load.frame", words::<Frame>()),
-            ("section.shape", words::<deck::section::ShapeWord>()),
+            ("section.le", words::<deck::LeadingEdgeWord>()),
+            ("section.shape", words::<deck::ShapeWord>()),
+            ("section.side", words::<deck::SideWord>()),
+            ("section.skin.side", words::<deck::SkinSideWord>()),
+            ("section.te", words::<deck::TrailingEdgeWord>()),
+            ("section.theta_sense", words::<deck::ThetaSenseWord>()),
+            ("section.webs.normal", words::<deck::section_shape::WebNormalWord>()),
             ("stage.control", words::<deck::stage::ControlWord>()),
             ("stage.kind", words::<StageKind>()),
             ("stage.scheme", words::<SchemeName>()),
@@ -347,6 +363,9 @@ mod tests {
         };
         let fix = [words::<deck::support::DirectionsWord>(), words::<deck::support::DirectionWord>()].concat();
         assert_eq!(pattern("support", "fix"), alternatives(fix));
+        let section = &schema["properties"]["section"]["additionalProperties"]["properties"];
+        let reference = section["reference"]["pattern"].as_str().unwrap_or_default();
+        assert_eq!(reference, alternatives(words::<deck::ReferenceWord>()));
         assert_eq!(pattern("cost", "scheme"), alternatives(words::<SchemeName>()));
         assert_eq!(pattern("cost", "interpolation"), alternatives(words::<InterpolationWord>()));
     }

@@ -2,7 +2,7 @@
 
 use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table, joined, kind_of};
-use super::words::{Words, words};
+use super::section_shape::{self, ComputedSection, ComputedShape, Fibre, Shape, ShearFactor};
 use toml::de::DeValue;
 
 /// `[section.NAME]`
@@ -33,82 +33,42 @@ pub enum SectionBody {
         /// 6x6 mass
         mass: Option<[[f64; 6]; 6]>,
     },
-    /// Shape and material
+    /// A circle, a tube or a rectangle, and its material
     Shaped {
         /// Shape with its dimensions
         shape: Shape,
         /// Name of the material
         material: Spanned<String>,
         /// Shear factors along 2 and 3, if not Cowper's
-        shear_factor: Option<[f64; 2]>,
+        shear_factor: Option<ShearFactor>,
     },
-}
-
-/// A cross-section.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// Solid circle
-    Circle {
-        /// Radius
-        radius: f64,
-    },
-    /// Ring
-    Tube {
-        /// Outer radius
-        radius: f64,
-        /// Wall
-        thickness: f64,
-    },
-    /// Solid rectangle
-    Rectangle {
-        /// Along axis 2
-        width: f64,
-        /// Along axis 3
-        height: f64,
-    },
-}
-
-words! {
-    /// `shape = …`
-    pub enum ShapeWord {
-        /// Solid circle
-        Circle = "circle",
-        /// Ring
-        Tube = "tube",
-        /// Solid rectangle
-        Rectangle = "rectangle",
-    }
-}
-
-impl ShapeWord {
-    /// Keys of the dimensions of a shape.
-    fn keys(self) -> &'static [&'static str] {
-        match self {
-            Self::Circle => &["radius"],
-            Self::Tube => &["radius", "thickness"],
-            Self::Rectangle => &["width", "height"],
-        }
-    }
+    /// A shape whose matrices are computed
+    Computed(Box<ComputedSection>),
 }
 
 const RESULTANT_KEYS: [&str; 6] = ["EA", "GA", "GJ", "EI", "rhoA", "rhoJ"];
 const FULL_KEYS: [&str; 2] = ["stiffness", "mass"];
-const SHAPE_KEYS: [&str; 7] = ["material", "shape", "radius", "thickness", "width", "height", "shear_factor"];
-const DIMENSIONS: [&str; 4] = ["radius", "thickness", "width", "height"];
 
 /// Keys of `[section.NAME]`.
-pub(super) const KEYS: [&str; 15] = joined(&[&RESULTANT_KEYS, &FULL_KEYS, &SHAPE_KEYS]);
+pub(super) const KEYS: [&str; 8 + section_shape::KEYS.len()] =
+    joined(&[&RESULTANT_KEYS, &FULL_KEYS, &section_shape::KEYS]);
 
-pub(super) fn read_section<'a>(context: &'a Context, name: Spanned<String>, item: &'a Item<'a>) -> Option<Section> {
+/// Reads a section; `layups` are the names of all layups of the deck.
+pub(super) fn read_section<'a>(
+    context: &'a Context,
+    name: Spanned<String>,
+    item: &'a Item<'a>,
+    layups: &[String],
+) -> Option<Section> {
     let table = Table::new(context, item, format!("[section.{}]", name.value), &KEYS)?;
     let first_of = |keys: &[&'static str]| keys.iter().copied().find(|key| table.has(key));
     let by_resultants = first_of(&RESULTANT_KEYS);
     let by_matrices = first_of(&FULL_KEYS);
-    let by_shape = first_of(&SHAPE_KEYS);
+    let by_shape = first_of(&section_shape::KEYS);
     let body = match (by_resultants, by_matrices, by_shape) {
         (Some(_), None, None) => read_resultants(&table),
         (None, Some(_), None) => read_full(&table),
-        (None, None, Some(_)) => read_shaped(&table),
+        (None, None, Some(_)) => section_shape::read_shaped(&table, layups).map(body_of),
         (None, None, None) => table.wrong(format!(
             "{} needs section stiffnesses (EA, GA, GJ, EI), or `stiffness`, or `material` and `shape`",
             table.what
@@ -121,24 +81,21 @@ pub(super) fn read_section<'a>(context: &'a Context, name: Spanned<String>, item
     Some(Section { name, body: body? })
 }
 
-/// Two positive numbers, or one for both.
-fn read_pair(table: &Table, key: &str) -> Option<[f64; 2]> {
-    let item = table.required(key)?;
-    let values = match item.get_ref() {
-        DeValue::Array(_) => table.context.vector::<2>(item)?,
-        _ => table.context.number(item)?.map(|v| [v, v]),
-    };
-    if values.value.iter().all(|&v| v > 0.0) {
-        return Some(values.value);
+/// Circles, tubes and rectangles as they are, and all other shapes, which are computed.
+fn body_of(section: ComputedSection) -> SectionBody {
+    let ComputedSection { shape, material, reference, turn, mesh, fibre, shear_factor, .. } = &section;
+    let is_plain = reference.is_none() && *turn == 0.0 && mesh.is_none() && *fibre == Fibre::default();
+    if let (ComputedShape::Solid(shape), Some(material), true) = (shape, material, is_plain) {
+        return SectionBody::Shaped { shape: *shape, material: material.clone(), shear_factor: *shear_factor };
     }
-    table.context.wrong(values.span, format!("`{key}` must be positive"))
+    SectionBody::Computed(Box::new(section))
 }
 
 fn read_resultants(table: &Table) -> Option<SectionBody> {
     let extension = table.required_positive("EA");
-    let shear = read_pair(table, "GA");
+    let shear = table.positive_pair("GA");
     let torsion = table.required_positive("GJ");
-    let bending = read_pair(table, "EI");
+    let bending = table.positive_pair("EI");
     let mass = table.non_negative("rhoA");
     let rotary = table.non_negative_vector::<3>("rhoJ");
     let [ga2, ga3] = shear?;
@@ -184,33 +141,4 @@ pub(super) fn read_matrix<const N: usize>(table: &Table, key: &str, item: &Item)
         }
     }
     Some(out)
-}
-
-fn read_shaped(table: &Table) -> Option<SectionBody> {
-    let context = table.context;
-    let material = table.required("material");
-    let shape = table.required("shape");
-    let material = context.text(material?)?;
-    let kind: ShapeWord = context.word(shape?, "shape")?.value;
-    for key in DIMENSIONS.into_iter().filter(|key| !kind.keys().contains(key)) {
-        table.refuse(key, format!("`{key}` is not allowed with shape = \"{}\"", kind.word()));
-    }
-    for key in kind.keys() {
-        table.required(key);
-    }
-    let size = |key: &str| table.positive(key).map(|v| v.value);
-    let shape = match kind {
-        ShapeWord::Circle => Shape::Circle { radius: size("radius")? },
-        ShapeWord::Tube => {
-            let radius = size("radius")?;
-            let thickness = size("thickness")?;
-            if thickness > radius {
-                return table.wrong_key("thickness", "the wall is thicker than the radius");
-            }
-            Shape::Tube { radius, thickness }
-        }
-        ShapeWord::Rectangle => Shape::Rectangle { width: size("width")?, height: size("height")? },
-    };
-    let shear_factor = table.optional("shear_factor", |_, _| read_pair(table, "shear_factor"))?;
-    Some(SectionBody::Shaped { shape, material, shear_factor })
 }

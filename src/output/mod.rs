@@ -27,7 +27,7 @@ pub use history::{
 };
 pub use modes::ModesWriter;
 pub use ownership::{OutputKind, may_replace, refuse_no_folder};
-pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale};
+pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale, SectionPicture};
 pub use quantities::{Units, quantity_of};
 pub use record::{
     DeckSource, FileRecord, FinishedRun, ReachedAccuracy, ReachedColumn, Record, RunSummary, TableRecord, TableSource,

@@ -66,7 +66,8 @@ impl Units {
         self.of_column(column).map_or_else(|| title.to_string(), |unit| format!("{title} [{unit}]"))
     }
 
-    fn label(&self, dimension: Dimension) -> Option<String> {
+    /// The unit of a dimension.
+    pub fn label(&self, dimension: Dimension) -> Option<String> {
         let Dimension { angle, force, length, time } = dimension;
         let mut above = Vec::new();
         let mut below = Vec::new();

@@ -21,6 +21,7 @@ pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     refuse_twins("beam", deck.beams.iter().map(|b| &b.name), diagnostics);
     clocks_go_forward(deck, diagnostics);
     mass_where_needed(deck, diagnostics);
+    warn_of_coarse_sections(deck, diagnostics);
     warn_of_equal_places(deck, diagnostics);
     refuse_idle_tables(deck, diagnostics);
     refuse_vectors_where_there_are_increments(deck, diagnostics);
@@ -55,6 +56,13 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
             clock = end;
         }
     }
+}
+
+/// Warns of computed sections, which beams use, whose error is large.
+fn warn_of_coarse_sections(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    let is_used = |name: &str| deck.beams.iter().any(|beam| beam.sections.iter().any(|own| own.value == name));
+    let used = deck.sections.iter().filter(|section| is_used(&section.name.value));
+    diagnostics.extend(used.filter_map(|section| super::computed::warning(section, deck)));
 }
 
 /// Inertia and gravity need mass: of beams, or of bodies that massless beams carry.
@@ -101,6 +109,10 @@ fn missing_mass(deck: &Deck, section: &deck::Section) -> Option<Missing> {
         SectionBody::Shaped { material, .. } => {
             let material = deck.materials.iter().find(|m| m.name.value == material.value)?;
             material.density.is_none().then_some(Missing { key: "a material with `rho`", zero: "`rho = 0`" })
+        }
+        SectionBody::Computed(body) => {
+            let without = !super::computed::has_density(body, deck);
+            without.then_some(Missing { key: "materials with `rho`", zero: "`rho = 0`" })
         }
         SectionBody::Resultants { mass: Some(_), .. } | SectionBody::Full { mass: Some(_), .. } => None,
     }

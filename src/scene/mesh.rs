@@ -297,11 +297,10 @@ impl Mesh {
         };
         let section = match &beam.sections[..] {
             [] => return Err(Diagnostic::error("a beam needs a section", beam.span.clone())),
-            [one] => SectionCourse::Uniform(section::matrices(find(one)?, &deck.materials)?),
-            [start, end] if beam.stations.is_none() => section::taper([find(start)?, find(end)?], &deck.materials)?,
+            [one] => SectionCourse::Uniform(section::matrices(find(one)?, deck)?),
+            [start, end] if beam.stations.is_none() => section::taper([find(start)?, find(end)?], deck)?,
             several => {
-                let pair =
-                    |pair: &[Spanned<String>]| section::taper([find(&pair[0])?, find(&pair[1])?], &deck.materials);
+                let pair = |pair: &[Spanned<String>]| section::taper([find(&pair[0])?, find(&pair[1])?], deck);
                 let courses = several.windows(2).map(pair).collect::<Result<_, _>>()?;
                 let fractions = beam.stations.as_ref().map_or(Vec::new(), |stations| stations.value.clone());
                 SectionCourse::Stations { fractions, courses }

@@ -2,6 +2,7 @@
 
 mod check;
 mod compose;
+mod computed;
 mod constraints;
 mod figure;
 mod joints;
@@ -16,8 +17,10 @@ mod section;
 mod switches;
 
 pub use compose::Reason;
+pub use computed::{Solution, SolvedSection, solved};
 pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
+pub use section::matrices as section_matrices;
 
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody, Target,

@@ -1,6 +1,10 @@
 //! Sections as matrices in their local axes, from resultants, full matrices, or shape and material.
 
-use crate::deck::{self, Diagnostic, EffectWord, Effects, SectionBody, Shape, Span, Spanned, StationsWord};
+use super::computed;
+use crate::deck::{
+    self, Deck, Diagnostic, EffectWord, Effects, Elastic, Isotropic, SectionBody, Shape, ShearFactor, Span, Spanned,
+    StationsWord,
+};
 use beamsim_core::model::{MassPerLength, SectionMatrices};
 use beamsim_core::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix6, SymmetricEigen};
@@ -16,9 +20,11 @@ pub enum SectionCourse {
         /// At start and end
         shapes: [Shape; 2],
         /// The material of both
-        material: deck::Material,
+        material: Isotropic,
+        /// Its density, where given
+        density: Option<f64>,
         /// Shear factors of both, where given
-        shear_factors: [Option<[f64; 2]>; 2],
+        shear_factors: [Option<ShearFactor>; 2],
     },
     /// Each entry linear in arc length
     Blended([SectionMatrices; 2]),
@@ -45,13 +51,15 @@ impl SectionCourse {
     pub fn at(&self, s: f64) -> SectionMatrices {
         match self {
             Self::Uniform(section) => section.clone(),
-            Self::Shaped { shapes, material, shear_factors } => {
+            Self::Shaped { shapes, material, density, shear_factors } => {
                 let shape = blend_shapes(shapes, s);
                 let factor = match shear_factors {
-                    [Some(a), Some(b)] => Some([0, 1].map(|k| mix(a[k], b[k], s))),
+                    [Some(ShearFactor::Given(a)), Some(ShearFactor::Given(b))] => {
+                        Some(ShearFactor::Given([0, 1].map(|k| mix(a[k], b[k], s))))
+                    }
                     [one, other] => one.or(*other),
                 };
-                shaped(shape, material, factor)
+                shaped(shape, *material, *density, factor)
             }
             Self::Blended([a, b]) => blend(a, b, s),
             Self::Stations { fractions, courses } => {
@@ -133,7 +141,7 @@ fn blend(a: &SectionMatrices, b: &SectionMatrices, s: f64) -> SectionMatrices {
 }
 
 /// The matrices of a section of the deck.
-pub fn matrices(section: &deck::Section, materials: &[deck::Material]) -> Result<SectionMatrices, Diagnostic> {
+pub fn matrices(section: &deck::Section, deck: &Deck) -> Result<SectionMatrices, Diagnostic> {
     let span = &section.name.span;
     match &section.body {
         SectionBody::Resultants { stiffness, mass, rotary } => {
@@ -148,13 +156,28 @@ pub fn matrices(section: &deck::Section, materials: &[deck::Material]) -> Result
         }
         SectionBody::Full { stiffness, mass } => full(section, stiffness, mass.as_ref(), span),
         SectionBody::Shaped { shape, material, shear_factor } => {
-            within_range(shaped(*shape, find_material(material, materials)?, *shear_factor), section)
+            let found = find_material(material, &deck.materials)?;
+            match found.elastic {
+                Elastic::Isotropic(elastic) => {
+                    within_range(shaped(*shape, elastic, found.density, *shear_factor), section)
+                }
+                Elastic::Orthotropic { .. } => of_shape(section, deck),
+            }
         }
+        SectionBody::Computed(_) => of_shape(section, deck),
+    }
+}
+
+/// The matrices of a section that is computed from its shape.
+fn of_shape(section: &deck::Section, deck: &Deck) -> Result<SectionMatrices, Diagnostic> {
+    match computed::solved(section, deck) {
+        Some(solved) => Ok(solved?.matrices),
+        None => Err(Diagnostic::error("a section without a shape", section.name.span.clone())),
     }
 }
 
 /// Refuses resultants of a shape that no floating-point number holds.
-fn within_range(found: SectionMatrices, section: &deck::Section) -> Result<SectionMatrices, Diagnostic> {
+pub fn within_range(found: SectionMatrices, section: &deck::Section) -> Result<SectionMatrices, Diagnostic> {
     let stiff = (0..6).all(|k| found.stiffness[k][k].is_finite() && found.stiffness[k][k] > 0.0);
     let heavy = found.mass.as_ref().is_none_or(|mass| mass.mass.is_finite() && mass.about_line.max_abs().is_finite());
     if stiff && heavy {
@@ -167,25 +190,27 @@ fn within_range(found: SectionMatrices, section: &deck::Section) -> Result<Secti
 }
 
 /// The course of a taper between two sections.
-pub fn taper(ends: [&deck::Section; 2], materials: &[deck::Material]) -> Result<SectionCourse, Diagnostic> {
+pub fn taper(ends: [&deck::Section; 2], deck: &Deck) -> Result<SectionCourse, Diagnostic> {
     if let [
         SectionBody::Shaped { shape: a, material: ma, shear_factor: fa },
         SectionBody::Shaped { shape: b, material: mb, shear_factor: fb },
     ] = ends.map(|section| &section.body)
     {
         let alike = std::mem::discriminant(a) == std::mem::discriminant(b) && ma.value == mb.value;
-        let material = find_material(ma, materials)?.clone();
-        if alike && fa.is_some() == fb.is_some() {
+        let found = find_material(ma, &deck.materials)?;
+        let factors_alike = fa.map(|factor| std::mem::discriminant(&factor)) == fb.map(|f| std::mem::discriminant(&f));
+        if let (true, true, Elastic::Isotropic(material)) = (alike, factors_alike, found.elastic) {
             // Between the ends nothing is larger, or smaller, than at both.
-            matrices(ends[0], materials)?;
-            matrices(ends[1], materials)?;
-            return Ok(SectionCourse::Shaped { shapes: [*a, *b], material, shear_factors: [*fa, *fb] });
+            matrices(ends[0], deck)?;
+            matrices(ends[1], deck)?;
+            let density = found.density;
+            return Ok(SectionCourse::Shaped { shapes: [*a, *b], material, density, shear_factors: [*fa, *fb] });
         }
     }
-    Ok(SectionCourse::Blended([matrices(ends[0], materials)?, matrices(ends[1], materials)?]))
+    Ok(SectionCourse::Blended([matrices(ends[0], deck)?, matrices(ends[1], deck)?]))
 }
 
-fn find_material<'a>(
+pub fn find_material<'a>(
     name: &Spanned<String>,
     materials: &'a [deck::Material],
 ) -> Result<&'a deck::Material, Diagnostic> {
@@ -243,13 +268,22 @@ fn mass_properties(matrix: &[[f64; 6]; 6]) -> Result<MassPerLength, String> {
 }
 
 /// EA, GA with Cowper's (1966) shear factors, GJ with Saint-Venant torsion, EI.
-fn shaped(shape: Shape, material: &deck::Material, shear_factor: Option<[f64; 2]>) -> SectionMatrices {
+pub fn shaped(
+    shape: Shape,
+    material: Isotropic,
+    density: Option<f64>,
+    shear_factor: Option<ShearFactor>,
+) -> SectionMatrices {
     let Geometry { area, bending, torsion, shear } = geometry(shape, material.poisson);
-    let [k2, k3] = shear_factor.unwrap_or(shear);
+    let [k2, k3] = match shear_factor {
+        None => shear,
+        Some(ShearFactor::Given(factors)) => factors,
+        Some(ShearFactor::Energy) => shear_factors_of_energy(shape, material.poisson),
+    };
     let e = material.young;
     let g = material.shear;
     let diagonal = [e * area, g * area * k2, g * area * k3, g * torsion, e * bending[0], e * bending[1]];
-    let mass = material.density.map(|rho| MassPerLength {
+    let mass = density.map(|rho| MassPerLength {
         mass: rho * area,
         offset: Vec3::ZERO,
         about_line: Mat3::diagonal([bending[0] + bending[1], bending[0], bending[1]].map(|i| rho * i)),
@@ -316,6 +350,59 @@ fn rectangle_torsion(width: f64, height: f64) -> f64 {
     a * cube(b) * (1.0 / 3.0 - 64.0 / (PI * fourth(PI)) * (b / a) * sum)
 }
 
+/// Shear factors of the energy of Saint-Venant flexure (Renton 1991).
+fn shear_factors_of_energy(shape: Shape, nu: f64) -> [f64; 2] {
+    let ring = |m: f64| {
+        let square = (1.0 + nu) * (1.0 + nu);
+        let m2 = (1.0 + m * m) * (1.0 + m * m);
+        let solid = 7.0 + 14.0 * nu + 8.0 * nu * nu;
+        let hole = 5.0 + 10.0 * nu + 4.0 * nu * nu;
+        6.0 * square * m2 / (solid * m2 + 4.0 * hole * m * m)
+    };
+    match shape {
+        Shape::Circle { .. } => [ring(0.0); 2],
+        Shape::Tube { radius, thickness } => [ring((radius - thickness) / radius); 2],
+        Shape::Rectangle { width, height } => [rectangle_shear(width, height, nu), rectangle_shear(height, width, nu)],
+    }
+}
+
+/// The shear factor of a rectangle from the energy of Saint-Venant flexure, for a force along its
+/// side `depth`: 1 / (6/5 + A c^2 sum b_n^2 b/k^2 (2a - 2 tanh(k a)/k)) with a and b the half
+/// sides, k = n pi / b, b_n = 2b / (n pi) and c = nu / ((1 + nu) I).
+fn rectangle_shear(depth: f64, width: f64, nu: f64) -> f64 {
+    let b = 0.5 * width;
+    let c = 12.0 * nu / ((1.0 + nu) * width * cube(depth));
+    let term = |n: f64| {
+        let k = n * PI / b;
+        let coefficient = 2.0 * b / (n * PI);
+        coefficient * coefficient * (b / (k * k)) * (depth - 2.0 * libm::tanh(0.5 * k * depth) / k)
+    };
+    let sum: f64 = (1..=200).map(|n| term(f64::from(n))).sum();
+    1.0 / (1.2 + width * depth * c * c * sum)
+}
+
+/// Stiffness and mass about the middle of a shape with a closed form, or about the origin of one
+/// that was computed.
+pub struct Closed {
+    /// 6x6 stiffness
+    pub stiffness: Matrix6<f64>,
+    /// 6x6 mass; zero where there is none
+    pub mass: Matrix6<f64>,
+}
+
+impl Closed {
+    /// From matrices whose mass centre is their origin.
+    pub fn of(found: &SectionMatrices) -> Self {
+        let MassPerLength { mass, about_line, .. } = found.mass_per_length();
+        let mass = Matrix6::from_fn(|i, j| match (i < 3, j < 3) {
+            (true, true) if i == j => mass,
+            (false, false) => about_line.0[i - 3][j - 3],
+            (true, _) | (_, true) => 0.0,
+        });
+        Self { stiffness: Matrix6::from_fn(|i, j| found.stiffness[i][j]), mass }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -326,6 +413,19 @@ mod tests {
         for (ratio, k1) in [(1.0, 0.1406), (2.0, 0.229), (10.0, 0.312)] {
             assert!((rectangle_torsion(ratio, 1.0) / ratio - k1).abs() < 6e-4, "{ratio}");
         }
+    }
+
+    #[test]
+    fn shear_factors_of_energy_are_those_of_the_theory() {
+        // Renton 1991 and finite elements, Poisson's ratio 0.3.
+        for (depth, width, factor) in
+            [(1.0, 1.0, 0.82822), (2.0, 1.0, 0.83294), (1.0, 2.0, 0.78444), (1.0, 10.0, 0.17913)]
+        {
+            assert!((rectangle_shear(depth, width, 0.3) - factor).abs() < 2e-5, "{depth} {width}");
+        }
+        let [circle, _] = shear_factors_of_energy(Shape::Circle { radius: 1.0 }, 0.3);
+        let [tube, _] = shear_factors_of_energy(Shape::Tube { radius: 1.0, thickness: 0.5 }, 0.3);
+        assert!((circle - 0.85067).abs() < 1e-5 && (tube - 0.58713).abs() < 1e-5);
     }
 
     #[test]

@@ -288,6 +288,32 @@ fn cost_writes_its_table_and_plot_and_prints_lines_for_an_accuracy() {
     assert!(plot.contains("CPU time [s]") && plot.contains("order 2, relative") && !plot.contains("NaN"));
 }
 
+#[test]
+fn section_shows_numbers_and_draws() {
+    let folder = Folder::new("section");
+    let box_section = "[material.m]\nE = 100\nnu = 0.3\nrho = 2\n[section.box]\nshape = \"box\"\nmaterial = \"m\"\n\
+                       d = 2\nb = 1\nt = 0.1\n[section.rod]\nEA = 1\nGA = 1\nGJ = 1\nEI = 1\n";
+    folder.write("deck.toml", box_section);
+    let output = folder.beamsim(&["section", "deck.toml"]);
+    assert_eq!(status(&output), 0, "{}", last_line(&output));
+    let text = String::from_utf8_lossy(&output.stdout);
+    for part in ["section box\n", "nodes", "shear centre: (0.0, 0.0)", "[section.box]\n", "section rod\n"] {
+        assert!(text.contains(part), "{part} is not in\n{text}");
+    }
+    assert_eq!(folder.names("results/deck"), ["box-warping.svg", "box.svg"]);
+    // The printed table is a section again, with the same numbers.
+    let start = text.find("[section.box]").unwrap();
+    let end = start + text[start..].find("results").unwrap();
+    folder.write("pasted.toml", &text[start..end]);
+    let again = folder.beamsim(&["section", "pasted.toml", "box", "--json"]);
+    let numbers: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
+    let area = 2.0 - 0.8 * 1.8;
+    assert!((numbers["ea"].as_f64().unwrap() / (100.0 * area) - 1.0).abs() < 1e-6, "{numbers}");
+    assert!((numbers["mass"][0][0].as_f64().unwrap() / (2.0 * area) - 1.0).abs() < 1e-6, "{numbers}");
+    let output = folder.beamsim(&["section", "deck.toml", "bax"]);
+    assert_eq!((status(&output), last_line(&output).contains("no section `bax`")), (2, true));
+}
+
 /// The first step on offer fails in two steps of five, and takes three times the iterations of half of it.
 #[test]
 fn a_search_gives_up_steps_that_fail() {

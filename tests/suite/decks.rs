@@ -104,6 +104,11 @@ fn prestress_holds() {
     all_hold("decks/prestress", 6);
 }
 
+#[test]
+fn computed_sections_hold() {
+    all_hold("decks/sections", 5);
+}
+
 /// Those of `decks/hard/long` are for `beamsim verify decks/hard/long`.
 fn hard_cases(families: &str, at_least: usize) {
     let mut decks = decks("decks/hard");

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 /// From the bottom to the top; each imports only what stands before it, and `deck`, the words, only the names of failures and
 /// warnings, and [`DECK_ROWS`].
 #[rustfmt::skip]
-const ORDER: [&str; 20] = [
-    "failure", "warning", "interrupt", "threads", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "run", "probe",
+const ORDER: [&str; 21] = [
+    "failure", "warning", "interrupt", "threads", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "section", "run", "probe",
     "deck", "scene", "output", "study", "cli",
 ];
 
@@ -19,17 +19,19 @@ const DECK_ROWS: [&str; 2] = ["beamsim_core::effect::joint::JointKind", "beamsim
 const BELOW_ALL: [&str; 2] = ["failure", "warning"];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 19] = [
+const CRATES: [(&str, &[&str]); 20] = [
     ("rayon", &["core/src/threads.rs"]),
     (
         "faer",
         &[
+            "core/src/solve/cholesky.rs",
             "core/src/solve/columns.rs",
             "core/src/solve/general.rs",
             "core/src/solve/krylov.rs",
             "core/src/solve/block/order.rs",
         ],
     ),
+    ("spade", &["core/src/section/triangulate.rs"]),
     ("toml", &["src/deck/"]),
     ("toml_edit", &["src/deck/"]),
     ("annotate_snippets", &["src/deck/"]),
@@ -76,7 +78,7 @@ const ONE_THING: &[(&str, &[&str])] = &[
     ("parameters are read before what may name them", &["src/deck/parameters.rs", "src/deck/reader.rs"]),
     ("motions and loads share histories", &["src/scene/compose/mod.rs", "src/scene/constraints.rs"]),
     ("names are those of the mesh and its sections", &[
-        "src/scene/mesh.rs", "src/scene/names.rs", "src/scene/section.rs",
+        "src/scene/computed.rs", "src/scene/mesh.rs", "src/scene/names.rs", "src/scene/section.rs",
     ]),
     ("one search: the points that it tries, and its rounds", &[
         "src/study/accuracy/candidates.rs", "src/study/accuracy/mod.rs", "src/study/accuracy/round.rs",

@@ -36,6 +36,7 @@ mod resume;
 mod rotations;
 mod scenes;
 mod schemes;
+mod sections;
 mod signals;
 mod solvers;
 mod stages;

@@ -1,6 +1,7 @@
 //! Newton's iteration: linear solver, stop test, and the failures it can end with.
 
 mod block;
+mod cholesky;
 mod columns;
 mod constraints;
 mod convergence;
@@ -21,6 +22,7 @@ mod tangent;
 mod work;
 
 pub use block::BlockSolver;
+pub use cholesky::{Cholesky, NodeGraph};
 pub use convergence::{Convergence, Judgement, Residual, Verdict, size};
 pub use general::GeneralSolver;
 pub use krylov::{Operator, Spectrum, largest_eigenvalues};

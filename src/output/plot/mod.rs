@@ -1,17 +1,21 @@
 //! Line plots as SVG, for print and screen. Colours follow the light or dark mode of the reader.
 //!
+//! Also pictures of sections with their meshes.
+//!
 //! The colours suit colour-blind readers, and dashes or marks distinguish lines without colours.
-//! The picture is 860 pixels wide; its height grows with the legend.
+//! A plot is 860 pixels wide; its height grows with the legend.
 
 mod layout;
 mod line_plot;
 #[cfg(feature = "png")]
 mod png;
+mod section_picture;
 mod svg;
 mod text;
 mod ticks;
 
 pub use line_plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale};
+pub use section_picture::SectionPicture;
 
 use layout::Layout;
 

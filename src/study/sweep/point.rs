@@ -6,6 +6,7 @@ use crate::study::built::BuiltDeck;
 use crate::study::error_bars::of_expected;
 use crate::study::outcome::Outcome;
 use crate::study::{Recorder, expected_values};
+use beamsim_core::failure::FailureKind;
 use beamsim_core::run::{Failure, Warning};
 use serde::{Deserialize, Serialize};
 
@@ -52,6 +53,10 @@ pub fn run(text: &str, settings: &[String], error_bars: bool, interrupted: &dyn 
     };
     match BuiltDeck::read(&text) {
         Ok(built) => simulate(&text, built, error_bars, interrupted),
+        // A section that was not computed to its end is no error of the deck.
+        Err(_) if interrupted().is_some() => {
+            PointResult::failed(FailureKind::Interrupted.name(), "interrupted while sections were computed".into())
+        }
         Err(error) => PointResult::failed(error.kind().name(), error.to_string()),
     }
 }

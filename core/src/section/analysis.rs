@@ -1,0 +1,217 @@
+//! A section on meshes that become finer until its estimated error meets an aim.
+
+use super::error::{SectionError, check_nodes};
+use super::geometry::Geometry;
+use super::grid::REFINEMENT;
+use super::material::Material;
+use super::mesh::Mesh;
+use super::properties::{Properties, load_about_origin, mass_centre, moved, moved_compliance, relative_difference};
+use super::saint_venant::{Solution, solve};
+use super::stress::NodalStresses;
+use super::{Matrix6, Point, Vector6};
+use crate::interrupt;
+
+/// The aimed error of the stiffness where none is given
+pub const DEFAULT_AIM: f64 = 1e-3;
+
+/// Estimates above this deserve a warning
+pub const POOR_ESTIMATE: f64 = 1e-2;
+
+/// Refinement ends before meshes of more nodes
+const MAX_NODES: usize = 60_000;
+
+/// Order of convergence that estimates count on. Smooth sections converge with order 4, corners
+/// between materials with less than 2.
+const ASSUMED_ORDER: f64 = 2.0;
+
+/// Order by which the level that meets the aim is predicted
+const PREDICTED_ORDER: f64 = 3.5;
+
+/// Levels that are skipped at most
+const MAX_JUMP: usize = 4;
+
+/// Highest level of the first mesh
+const MAX_FIRST_LEVEL: usize = 4;
+
+/// The point of a section through which the line of the beam goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reference {
+    /// A point in the coordinates of the shape, turned and moved
+    Point(Point),
+    /// Centre of the area
+    Centroid,
+    /// The point at which an axial force makes no curvature
+    TensionCentre,
+    /// The point at which a shear force makes no twist
+    ShearCentre,
+    /// Centre of mass
+    MassCentre,
+}
+
+/// A reason to warn of a computed section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SectionWarning {
+    /// The estimated error of the stiffness is large
+    PoorEstimate {
+        /// The estimate, relative
+        estimate: f64,
+    },
+    /// The aim was not met with the largest mesh
+    AimNotMet {
+        /// The estimate, relative
+        estimate: f64,
+    },
+}
+
+/// A computed section.
+#[derive(Clone, Debug)]
+pub struct Analysis {
+    /// The finest mesh
+    pub mesh: Mesh,
+    /// The solution on it
+    pub solution: Solution,
+    /// Estimated error of the stiffness, relative to the root of the products of diagonals
+    pub estimate: f64,
+    /// False if the aim was not met with the largest mesh
+    pub meets_aim: bool,
+    /// Level of the mesh
+    pub level: usize,
+}
+
+/// The aim of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MeshAim {
+    /// Estimated error of the stiffness, relative to the root of the products of diagonals
+    Error(f64),
+    /// Longest side of an element
+    Size(f64),
+}
+
+/// A section on one mesh.
+struct Computed {
+    level: usize,
+    mesh: Mesh,
+    solution: Solution,
+}
+
+impl Computed {
+    fn new(geometry: &Geometry, materials: &[Material], level: usize) -> Result<Self, SectionError> {
+        if interrupt::is_requested() {
+            return Err(SectionError::Interrupted);
+        }
+        let mesh = geometry.mesh(level)?;
+        check_nodes(mesh.nodes.len())?;
+        let mut solution = solve(&mesh, materials)?;
+        if materials.iter().all(Material::is_isotropic) {
+            // A mesh need not be as symmetric as its shape.
+            solution.impose_mirrors(geometry.mirrors());
+        }
+        Ok(Self { level, mesh, solution })
+    }
+
+    /// On the coarsest mesh whose curved elements are not folded.
+    fn coarsest(geometry: &Geometry, materials: &[Material]) -> Result<Self, SectionError> {
+        for level in 0..MAX_FIRST_LEVEL {
+            match Self::new(geometry, materials, level) {
+                Err(SectionError::InvertedElement { .. }) => {}
+                other => return other,
+            }
+        }
+        Self::new(geometry, materials, MAX_FIRST_LEVEL)
+    }
+
+    /// The estimated error, from a coarser mesh.
+    fn estimate(&self, coarser: &Self) -> f64 {
+        let refinement = REFINEMENT.powi((self.level - coarser.level) as i32);
+        let difference = relative_difference(&coarser.solution.stiffness, &self.solution.stiffness);
+        difference / (libm::pow(refinement, ASSUMED_ORDER) - 1.0)
+    }
+
+    /// The most levels by which a finer mesh has no more than the largest number of nodes.
+    fn possible_jump(&self) -> usize {
+        let nodes = |jump: usize| self.mesh.nodes.len() as f64 * REFINEMENT.powi(2 * jump as i32);
+        (1..=MAX_JUMP).rev().find(|&jump| nodes(jump) <= MAX_NODES as f64).unwrap_or(0)
+    }
+
+    fn finish(self, estimate: f64, meets_aim: bool) -> Analysis {
+        Analysis { mesh: self.mesh, solution: self.solution, estimate, meets_aim, level: self.level }
+    }
+}
+
+/// Computes a section on meshes that become finer until one meets the aim, or the next would be
+/// too large. The error is estimated from two meshes.
+pub fn analyse(geometry: &Geometry, materials: &[Material], aim: MeshAim) -> Result<Analysis, SectionError> {
+    let mut coarser = Computed::coarsest(geometry, materials)?;
+    let mut jump = 1;
+    loop {
+        let finer = Computed::new(geometry, materials, coarser.level + jump)?;
+        let estimate = finer.estimate(&coarser);
+        let wanted_jump = match aim {
+            MeshAim::Error(error) => libm::log(estimate / error) / (PREDICTED_ORDER * libm::log(REFINEMENT)),
+            MeshAim::Size(size) => libm::log(finer.mesh.longest_side() / size) / libm::log(REFINEMENT),
+        };
+        if wanted_jump <= 0.0 {
+            return Ok(finer.finish(estimate, true));
+        }
+        jump = finer.possible_jump().min(wanted_jump.ceil() as usize);
+        if jump == 0 {
+            return Ok(finer.finish(estimate, false));
+        }
+        coarser = finer;
+    }
+}
+
+impl Analysis {
+    /// Centres, torsional stiffness and principal axes.
+    pub fn properties(&self) -> Properties {
+        Properties::new(&self.solution.compliance)
+    }
+
+    /// The place of a reference point.
+    pub fn place(&self, reference: Reference) -> Point {
+        match reference {
+            Reference::Point(at) => at,
+            Reference::Centroid => self.solution.centroid,
+            Reference::TensionCentre => self.properties().tension_centre,
+            Reference::ShearCentre => self.properties().shear_centre,
+            Reference::MassCentre => mass_centre(&self.solution.mass),
+        }
+    }
+
+    /// Stiffness about a point.
+    pub fn stiffness_about(&self, at: Point) -> Matrix6 {
+        moved(&self.solution.stiffness, at)
+    }
+
+    /// Compliance about a point.
+    pub fn compliance_about(&self, at: Point) -> Matrix6 {
+        moved_compliance(&self.solution.compliance, at)
+    }
+
+    /// Mass about a point.
+    pub fn mass_about(&self, at: Point) -> Matrix6 {
+        moved(&self.solution.mass, at)
+    }
+
+    /// The load to give to [`NodalStresses`], from resultants about a point.
+    pub fn load_of(&self, resultants: &Vector6, at: Point) -> Vector6 {
+        load_about_origin(resultants, at)
+    }
+
+    /// Reasons to warn of the section.
+    pub fn warnings(&self) -> Vec<SectionWarning> {
+        let estimate = self.estimate;
+        let mut warnings = Vec::new();
+        if estimate > POOR_ESTIMATE {
+            warnings.push(SectionWarning::PoorEstimate { estimate });
+        } else if !self.meets_aim {
+            warnings.push(SectionWarning::AimNotMet { estimate });
+        }
+        warnings
+    }
+
+    /// Stresses under unit resultants.
+    pub fn stresses(&self, materials: &[Material]) -> Result<NodalStresses, SectionError> {
+        NodalStresses::new(&self.mesh, materials, &self.solution)
+    }
+}

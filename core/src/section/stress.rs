@@ -1,0 +1,243 @@
+//! Stresses of a section under resultants, at its nodes and at any point.
+//!
+//! The stress is the sum of the stresses of six unit resultants. They are evaluated at the nodes of
+//! elements, and averaged over the elements of one region around a node, never across regions.
+
+use super::element::SectionPoint;
+use super::error::SectionError;
+use super::material::{Material, material_axes, stress_in_material_axes, tensor};
+use super::mesh::{Element, Mesh};
+use super::saint_venant::{Solution, StiffnessField};
+use super::{Matrix6, Point, Vector6};
+use nalgebra::SymmetricEigen;
+use std::collections::HashMap;
+
+/// Steps of Newton's method for the place of a point in an element
+const MAX_STEPS: usize = 20;
+
+/// Largest distance of a point outside an element, in its reference coordinates
+const INSIDE_TOLERANCE: f64 = 1e-6;
+
+/// Unit stresses of each node and region.
+#[derive(Clone, Debug)]
+pub struct NodalStresses {
+    /// Node and region of each place
+    pub places: Vec<Place>,
+    /// Stresses of the six unit resultants, by columns, of each place
+    pub unit: Vec<Matrix6>,
+    /// Place of each node of each element
+    of_element: Vec<Vec<u32>>,
+}
+
+/// A node as a point of one region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Place {
+    /// The node
+    pub node: u32,
+    /// The region
+    pub region: u32,
+}
+
+/// The largest value of a stress.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// The value
+    pub value: f64,
+    /// Its place
+    pub at: Point,
+    /// Index of the region
+    pub region: usize,
+}
+
+/// The search for the largest stress near re-entrant corners, where it is infinite and a
+/// mesh only shows how fine it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Corners {
+    /// Points nearer than one wall thickness to a re-entrant corner are left out
+    Exclude,
+    /// All points
+    Include,
+}
+
+/// Unit stresses at a point, as part of one region.
+#[derive(Clone, Copy, Debug)]
+pub struct Probe {
+    /// Index of the region
+    pub region: usize,
+    /// Stresses of the six unit resultants in section axes, by columns
+    pub unit: Matrix6,
+    /// Angle of the wall tangent, rad
+    pub beta: f64,
+    /// Angle of the fibre, rad
+    pub theta: f64,
+}
+
+impl NodalStresses {
+    /// Recovers stresses at all nodes.
+    pub fn new(mesh: &Mesh, materials: &[Material], solution: &Solution) -> Result<Self, SectionError> {
+        let field = StiffnessField::new(mesh, materials)?;
+        let mut index: HashMap<Place, u32> = HashMap::new();
+        let mut stresses = Self { places: Vec::new(), unit: Vec::new(), of_element: Vec::new() };
+        let mut counts: Vec<f64> = Vec::new();
+        for element in &mesh.elements {
+            let mut of_element = Vec::new();
+            for (node, unit) in element.nodes().iter().zip(element_stresses(mesh, &field, solution, element)) {
+                let place = Place { node: *node, region: element.region };
+                let position = *index.entry(place).or_insert_with(|| {
+                    stresses.places.push(place);
+                    stresses.unit.push(Matrix6::zeros());
+                    counts.push(0.0);
+                    counts.len() as u32 - 1
+                });
+                stresses.unit[position as usize] += unit;
+                counts[position as usize] += 1.0;
+                of_element.push(position);
+            }
+            stresses.of_element.push(of_element);
+        }
+        for (unit, count) in stresses.unit.iter_mut().zip(counts) {
+            *unit /= count;
+        }
+        Ok(stresses)
+    }
+
+    /// The largest value of a measure of the stress under a load (N1 to M3).
+    pub fn largest(
+        &self,
+        mesh: &Mesh,
+        load: &Vector6,
+        corners: Corners,
+        measure: impl Fn(&Vector6) -> f64,
+    ) -> Option<Peak> {
+        let near_corner = |at: Point| {
+            corners == Corners::Exclude
+                && mesh
+                    .corners
+                    .iter()
+                    .any(|corner| libm::hypot(at[0] - corner.at[0], at[1] - corner.at[1]) < corner.wall)
+        };
+        let mut largest: Option<Peak> = None;
+        for (place, unit) in self.places.iter().zip(&self.unit) {
+            let at = mesh.nodes[place.node as usize];
+            let value = measure(&(unit * load));
+            if largest.is_none_or(|peak| value > peak.value) && !near_corner(at) {
+                largest = Some(Peak { value, at, region: place.region as usize });
+            }
+        }
+        largest
+    }
+
+    /// Unit stresses at a point, for each region that contains it: two on an interface.
+    pub fn probe(&self, mesh: &Mesh, at: Point) -> Vec<Probe> {
+        let mut probes: Vec<Probe> = Vec::new();
+        for (element, places) in mesh.elements.iter().zip(&self.of_element) {
+            if probes.iter().any(|probe| probe.region == element.region as usize) {
+                continue;
+            }
+            let Some(shape) = shape_at(mesh, element, at) else { continue };
+            let unit = places
+                .iter()
+                .zip(shape)
+                .fold(Matrix6::zeros(), |sum, (&place, shape)| sum + self.unit[place as usize] * shape);
+            let region = mesh.region(element);
+            let beta = region.tangent.beta(at);
+            probes.push(Probe { region: element.region as usize, unit, beta, theta: region.theta });
+        }
+        probes
+    }
+}
+
+impl Probe {
+    /// The stress under a load in section axes.
+    pub fn stress(&self, load: &Vector6) -> Vector6 {
+        self.unit * load
+    }
+
+    /// The stress under a load in material axes: fibre, transverse, normal.
+    pub fn stress_in_material_axes(&self, load: &Vector6) -> Vector6 {
+        stress_in_material_axes(&self.stress(load), &material_axes(self.beta, self.theta))
+    }
+}
+
+/// Unit stresses at the nodes of an element.
+fn element_stresses(mesh: &Mesh, field: &StiffnessField, solution: &Solution, element: &Element) -> Vec<Matrix6> {
+    let positions = mesh.positions(element);
+    let nodes = &positions[..element.kind.nodes()];
+    let at_node = |reference| {
+        let point = SectionPoint::new(reference, nodes);
+        field.at(element, point.at) * solution.unit_strains(element, &point)
+    };
+    element.kind.node_points().iter().map(at_node).collect()
+}
+
+/// Shape functions of an element at a point, if the point is inside.
+fn shape_at(mesh: &Mesh, element: &Element, at: Point) -> Option<[f64; 9]> {
+    let positions = mesh.positions(element);
+    let nodes = &positions[..element.kind.nodes()];
+    let within = |axis: usize| {
+        let low = nodes.iter().map(|node| node[axis]).fold(f64::MAX, f64::min);
+        let high = nodes.iter().map(|node| node[axis]).fold(f64::MIN, f64::max);
+        // Curved sides may reach beyond their nodes.
+        let margin = 0.1 * (high - low);
+        low - margin <= at[axis] && at[axis] <= high + margin
+    };
+    if !within(0) || !within(1) {
+        return None;
+    }
+    let mut xi = element.kind.middle();
+    for _ in 0..MAX_STEPS {
+        let reference = element.kind.at(xi, 1.0);
+        let point = SectionPoint::new(&reference, nodes);
+        let missing = [at[0] - point.at[0], at[1] - point.at[1]];
+        let mut map = [[0.0; 2]; 2];
+        for (node, slopes) in nodes.iter().zip(&reference.derivatives) {
+            for axis in 0..2 {
+                map[axis][0] += slopes[0] * node[axis];
+                map[axis][1] += slopes[1] * node[axis];
+            }
+        }
+        let step = [
+            (missing[0] * map[1][1] - missing[1] * map[0][1]) / point.determinant,
+            (missing[1] * map[0][0] - missing[0] * map[1][0]) / point.determinant,
+        ];
+        xi = [xi[0] + step[0], xi[1] + step[1]];
+        if step[0].abs() + step[1].abs() < 1e-10 {
+            break;
+        }
+    }
+    element.kind.contains(xi, INSIDE_TOLERANCE).then(|| element.kind.at(xi, 1.0).shape)
+}
+
+/// Von Mises stress.
+pub fn von_mises(s: &Vector6) -> f64 {
+    let normal = (s[0] - s[1]).powi(2) + (s[1] - s[2]).powi(2) + (s[2] - s[0]).powi(2);
+    let shear = s[3] * s[3] + s[4] * s[4] + s[5] * s[5];
+    (0.5 * normal + 3.0 * shear).sqrt()
+}
+
+/// Principal stresses, the largest first.
+pub fn principal_stresses(s: &Vector6) -> [f64; 3] {
+    let mut values: [f64; 3] = SymmetricEigen::new(tensor(s)).eigenvalues.into();
+    values.sort_by(|a, b| b.total_cmp(a));
+    values
+}
+
+/// The largest shear stress on any plane.
+pub fn largest_shear(s: &Vector6) -> f64 {
+    let [high, _, low] = principal_stresses(s);
+    0.5 * (high - low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measures_of_pure_shear() {
+        let s = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 2.0);
+        assert!((von_mises(&s) - 2.0 * 3_f64.sqrt()).abs() < 1e-12);
+        let principal = principal_stresses(&s);
+        assert!((principal[0] - 2.0).abs() < 1e-12 && (principal[2] + 2.0).abs() < 1e-12);
+        assert!((largest_shear(&s) - 2.0).abs() < 1e-12);
+    }
+}

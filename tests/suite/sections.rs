@@ -1,0 +1,223 @@
+//! Sections by shape, as decks give them: the reference sections of `core/tests/section`, and what only decks say.
+
+use beamsim::deck::{self, Deck};
+use beamsim::scene;
+use beamsim_core::model::SectionMatrices;
+use beamsim_core::section::Matrix6;
+use beamsim_core::section::properties::{moved, relative_difference, turned};
+use serde_json::Value;
+use std::fmt::Write;
+use std::sync::Arc;
+
+fn read(text: &str) -> Deck {
+    let (deck, found) = deck::read(text).unwrap_or_else(|found| panic!("{found:?}\n{text}"));
+    assert!(found.is_empty(), "{found:?}\n{text}");
+    deck
+}
+
+/// The matrices of the section `s`.
+fn matrices(text: &str) -> SectionMatrices {
+    let deck = read(text);
+    let section = deck.sections.iter().find(|section| section.name.value == "s").unwrap();
+    scene::section_matrices(section, &deck).unwrap_or_else(|found| panic!("{}\n{text}", found.message))
+}
+
+fn stiffness(text: &str) -> Matrix6 {
+    let found = matrices(text);
+    Matrix6::from_fn(|i, j| found.stiffness[i][j])
+}
+
+fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("{key} in {value}"))
+}
+
+/// `[material.NAME]` tables of a case.
+fn materials(case: &Value) -> String {
+    let mut text = String::new();
+    for (name, m) in case["materials"].as_object().unwrap() {
+        let _ = writeln!(text, "[material.{name}]\nrho = {}", m["rho"]);
+        let list = |keys: [&str; 3]| format!("[{}, {}, {}]", m[keys[0]], m[keys[1]], m[keys[2]]);
+        let _ = match m.get("E") {
+            Some(e) => writeln!(text, "E = {e}\nnu = {}", m["nu"]),
+            None => writeln!(
+                text,
+                "E = {}\nG = {}\nnu = {}",
+                list(["E1", "E2", "E3"]),
+                list(["G12", "G13", "G23"]),
+                list(["nu12", "nu13", "nu23"])
+            ),
+        };
+    }
+    text
+}
+
+/// `[section.s]` of a case, its line through the reference point of the case.
+fn section(case: &Value) -> String {
+    let g = &case["geometry"];
+    let material = case["materials"].as_object().unwrap().keys().next().unwrap();
+    let mut text = "[section.s]\nmesh = 1e-3\n".to_string();
+    if let Some(regions) = g["regions"].as_array() {
+        text += "shape = \"regions\"\n";
+        for region in regions {
+            let _ = writeln!(text, "[[section.s.region]]\nmaterial = {}", region["material"]);
+            let _ = match region["shape"].as_str() {
+                None => writeln!(text, "rect = {}", region["rect"]),
+                Some("circle") => writeln!(text, "circle = {}", region["radius"]),
+                Some(_) => {
+                    let hole = number(region, "radius") - number(region, "thickness");
+                    writeln!(text, "circle = {}\nholes = [{{ circle = {hole} }}]", region["radius"])
+                }
+            };
+        }
+        return text;
+    }
+    let keys = |keys: &[&str]| keys.iter().fold(String::new(), |all, key| format!("{all}{key} = {}\n", g[*key]));
+    let (body, reference) = match g["shape"].as_str().unwrap() {
+        "circle" => (keys(&["radius"]), [0.0; 2]),
+        "tube" => (keys(&["radius", "thickness"]), [0.0; 2]),
+        "ellipse" => {
+            let size = ["semi_axis_2", "semi_axis_3"].map(|key| 2.0 * number(g, key));
+            (format!("width = {}\nheight = {}\n", size[0], size[1]), [0.0; 2])
+        }
+        "rectangle" => {
+            let centre = [0, 1].map(|k| -g["centre"][k].as_f64().unwrap_or(0.0));
+            let angles = ["theta", "beta"].map(|key| g[format!("{key}_deg")].as_f64().unwrap_or(0.0).to_radians());
+            (format!("{}theta = {}\nbeta = {}\n", keys(&["width", "height"]), angles[0], angles[1]), centre)
+        }
+        "polygon" => (keys(&["outline"]), [0.0; 2]),
+        "channel" => {
+            let web = -0.5 * (number(g, "b") - number(g, "t_w"));
+            (keys(&["d", "b", "t_f", "t_w", "r"]), [web, 0.0])
+        }
+        "I" => (keys(&["d", "b", "t_f", "t_w", "r"]), [0.0; 2]),
+        "T" => (keys(&["d", "b", "t_f", "t_w", "r"]), [0.0, 0.5 * number(g, "d")]),
+        "box" if g.get("plies").is_some() => return format!("{text}{}", laminated_box(g)),
+        "box" => (keys(&["d", "b", "t"]), [0.0; 2]),
+        "laminate strip" => return format!("{text}{}", laminate_strip(g)),
+        other => panic!("unknown shape {other}"),
+    };
+    let [x2, x3] = reference;
+    format!("{text}shape = {}\nmaterial = \"{material}\"\nreference = [{x2}, {x3}]\n{body}", g["shape"])
+}
+
+fn laminated_box(g: &Value) -> String {
+    let (b, d) = (0.5 * number(g, "b"), 0.5 * number(g, "d"));
+    let count = number(g, "plies") as usize;
+    let ply = format!("[\"ply\", {}, \"15*deg\"], ", number(g, "t") / count as f64);
+    format!(
+        "shape = \"walls\"\nside = \"right\"\nreference = [0, 0]\n\
+         points = {{ a = [-{b}, {d}], b = [{b}, {d}], c = [{b}, -{d}], d = [-{b}, -{d}] }}\n\
+         walls = [[\"a\", \"b\", \"w\"], [\"b\", \"c\", \"w\"], [\"c\", \"d\", \"w\"], [\"d\", \"a\", \"w\"]]\n\
+         [layup.w]\nplies = [{}]\n",
+        ply.repeat(count)
+    )
+}
+
+fn laminate_strip(g: &Value) -> String {
+    let angles = g["theta_deg"].as_array().unwrap();
+    let names = g["materials"].as_array().unwrap();
+    let thickness = number(g, "height") / angles.len() as f64;
+    let half = 0.5 * number(g, "width");
+    // Plies of the file are from below, those of walls from the left of the line, which is above.
+    let plies = angles.iter().zip(names).rev();
+    let plies: String = plies.map(|(angle, name)| format!("[{name}, {thickness}, \"{angle}*deg\"], ")).collect();
+    format!(
+        "shape = \"walls\"\nreference = [0, 0]\nturn = \"{}*deg\"\npoints = {{ a = [-{half}, 0], b = [{half}, 0] }}\n\
+         walls = [[\"a\", \"b\", \"w\"]]\n[layup.w]\nplies = [{plies}]\n",
+        g["turn_deg"]
+    )
+}
+
+#[test]
+fn reference_sections_are_those_of_decks() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/core/tests/section/section_cases.json");
+    let cases: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    for case in cases.as_array().unwrap() {
+        let text = materials(case) + &section(case);
+        let reference = Matrix6::from_fn(|i, j| case["stiffness"][i][j].as_f64().unwrap());
+        let error = relative_difference(&stiffness(&text), &reference);
+        assert!(error < 1e-3, "{}: {error:.1e}\n{text}", case["name"]);
+    }
+}
+
+const STEEL: &str = "[material.steel]\nE = 2.1e5\nnu = 0.3\nrho = 7.85e-9\n";
+
+#[test]
+fn closed_forms_and_computed_sections_agree() {
+    let shapes = [
+        "shape = \"circle\"\nradius = 5",
+        "shape = \"tube\"\nradius = 5\nthickness = 1",
+        "shape = \"rectangle\"\nwidth = 4\nheight = 7",
+    ];
+    for shape in shapes {
+        let of = |more: &str| stiffness(&format!("{STEEL}[section.s]\nmaterial = \"steel\"\n{shape}\n{more}\n"));
+        let error = relative_difference(&of("mesh = 1e-4"), &of("shear_factor = \"energy\""));
+        assert!(error < 1e-4, "{shape}: {error:.1e}");
+        // Cowper's factors are larger.
+        assert!(of("")[(1, 1)] > 1.01 * of("shear_factor = \"energy\"")[(1, 1)]);
+    }
+}
+
+#[test]
+fn reference_and_turn_move_closed_forms_and_computed_sections() {
+    for mesh in ["", "mesh = 1e-3\n"] {
+        let shape =
+            format!("{STEEL}[section.s]\nmaterial = \"steel\"\nshape = \"rectangle\"\nwidth = 4\nheight = 7\n{mesh}");
+        let own = stiffness(&shape);
+        let placed = stiffness(&format!("{shape}reference = [0.5, -2]\nturn = 0.3\n"));
+        // Axes of a section that is turned by +0.3 see it as axes turned by -0.3 see the other one.
+        let expected = turned(&moved(&own, [0.5, -2.0]), -0.3);
+        assert!(relative_difference(&placed, &expected) < 1e-12);
+        assert_eq!(own[(0, 4)], 0.0);
+    }
+}
+
+#[test]
+fn a_section_is_computed_once() {
+    let text = format!("{STEEL}[section.s]\nshape = \"angle\"\nmaterial = \"steel\"\nd = 80\nb = 50\nt = 6\n");
+    let solve = || {
+        let deck = read(&text);
+        let solved =
+            scene::solved(&deck.sections[0], &deck).unwrap().unwrap_or_else(|found| panic!("{}", found.message));
+        solved.solution.unwrap().analysis
+    };
+    assert!(Arc::ptr_eq(&solve(), &solve()));
+}
+
+#[test]
+fn a_profile_with_root_radius_is_as_symmetric_as_its_shape() {
+    let shape = "[section.s]\nshape = \"I\"\nmaterial = \"steel\"\nd = 200\nb = 100\nt_f = 8.5\nt_w = 5.6\nr = 12\n";
+    let found = matrices(&format!("{STEEL}{shape}"));
+    let couplings = (0..36).filter(|k| k / 6 != k % 6 && found.stiffness[k / 6][k % 6] != 0.0).count();
+    assert_eq!(couplings, 0);
+    let mass = found.mass.unwrap();
+    assert!((mass.mass / 7.85e-9 / 2848.4 - 1.0).abs() < 1e-3, "{}", mass.mass);
+    // True arcs have a torsion constant of 68462 mm^4.
+    assert!((found.stiffness[3][3] * 2.6 / 2.1e5 / 68462.0 - 1.0).abs() < 1e-3);
+}
+
+/// An ellipse with a thin skin is near to a hollow ellipse, whose wall is thinner between its axes; it leads to +2 or to -2 alike.
+#[test]
+fn an_airfoil_is_its_skin() {
+    let count = 40;
+    let point = |k: usize| {
+        let angle = std::f64::consts::TAU * k as f64 / count as f64;
+        format!("[{}, {}], ", 0.5 + 0.5 * angle.cos(), 0.2 * angle.sin())
+    };
+    let profile: String = (0..=count).map(point).collect();
+    let blade = |le: &str| {
+        format!(
+            "{STEEL}[layup.skin]\nplies = [[\"steel\", 0.01]]\n[section.s]\nshape = \"airfoil\"\nprofile = [{profile}]\n\
+             chord = 1\npitch_axis = 0.5\nle = \"{le}\"\nskin = [{{ layup = \"skin\" }}]\n"
+        )
+    };
+    let ellipse = format!(
+        "{STEEL}[section.s]\nshape = \"ellipse\"\nmaterial = \"steel\"\nwidth = 1\nheight = 0.4\nthickness = 0.01\n"
+    );
+    let [plus, minus] = ["+2", "-2"].map(|le| stiffness(&blade(le)));
+    let ellipse = stiffness(&ellipse);
+    for i in [0, 3, 4, 5] {
+        assert!((plus[(i, i)] / ellipse[(i, i)] - 1.0).abs() < 0.1, "{i}: {} {}", plus[(i, i)], ellipse[(i, i)]);
+        assert!((plus[(i, i)] / minus[(i, i)] - 1.0).abs() < 1e-3);
+    }
+}
