@@ -26,7 +26,7 @@ pub(super) use estimate::{divisor_in_time, divisors_in_space, left_by_newton};
 use super::StudyError;
 use super::change::Change;
 use super::cost::{Family, Mesher, Original, Pace, Patience, Pool, Sampler, StudyOptions, Variant};
-use crate::deck::{Accuracy, Deck, InterpolationWord, StageBody};
+use crate::deck::{Accuracy, Beam, Deck, InterpolationWord, StageBody};
 use crate::scene::Scene;
 use crate::study::Outcome;
 use beamsim_core::run::Failure;
@@ -92,7 +92,7 @@ pub fn reach(
     let original = Original { text, deck };
     let pace = first_pace(deck);
     let sampler = Sampler::of_histories(deck, scene, outputs(wanted, scene)?, coarser(pace));
-    let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
+    let own: Vec<Vec<usize>> = deck.beams.iter().map(Beam::element_counts).collect();
     let mut mesher =
         Mesher { original, sampler: &sampler, interpolation: Some(InterpolationWord::Relative), keeps_places: true };
     if !mesher.makes_sense(None, &own) {

@@ -37,7 +37,8 @@ impl Mesher<'_> {
     pub fn elements(&self, order: Option<usize>, factor: f64) -> Vec<Vec<usize>> {
         let ratio = |beam: &Beam| (beam.order as f64 / order.unwrap_or(beam.order) as f64) * factor;
         let each = |count: &dyn Fn(&Beam, usize) -> usize| -> Vec<Vec<usize>> {
-            let of_beam = |beam: &Beam| beam.elements.value.iter().map(|&n| count(beam, n)).collect();
+            let of_beam =
+                |beam: &Beam| beam.elements.value.iter().map(|division| count(beam, division.count())).collect();
             self.original.deck.beams.iter().map(of_beam).collect()
         };
         let rounded = each(&|beam, n| (n as f64 * ratio(beam)).round().max(1.0) as usize);
@@ -46,7 +47,9 @@ impl Mesher<'_> {
             return rounded;
         }
         let parts = (2..=MOST_PARTS).rev().filter(|q| {
-            let whole = |beam: &Beam| *q as f64 * ratio(beam) <= 1.0 && beam.elements.value.iter().all(|n| n % q == 0);
+            let whole = |beam: &Beam| {
+                *q as f64 * ratio(beam) <= 1.0 && beam.elements.value.iter().all(|division| division.count() % q == 0)
+            };
             self.original.deck.beams.iter().all(whole)
         });
         let parts = parts.map(|q| each(&|_, n| n / q));

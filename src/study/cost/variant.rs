@@ -1,7 +1,7 @@
 //! Variants of a deck: other elements, orders, interpolations, schemes, steps and tolerances.
 
 use super::order::Expected;
-use crate::deck::{Beam, Deck, InterpolationWord, SchemeName, SchemeWord, StageBody, Words};
+use crate::deck::{Beam, Deck, Division, InterpolationWord, SchemeName, SchemeWord, StageBody, Words};
 use crate::study::change::Change;
 
 /// A deck that a study varies.
@@ -136,8 +136,10 @@ impl Variant {
         let order = self.family.order.unwrap_or(beam.order);
         let interpolation = self.family.interpolation.unwrap_or(beam.interpolation);
         let mut changes = Vec::new();
-        if elements != beam.elements.value {
-            changes.push(Change::Elements { beam: k, counts: elements.to_vec() });
+        let own = &beam.elements.value;
+        if !own.iter().map(Division::count).eq(elements.iter().copied()) {
+            let divisions = own.iter().zip(elements).map(|(division, &count)| division.with_count(count));
+            changes.push(Change::Elements { beam: k, divisions: divisions.collect() });
         }
         if order != beam.order {
             changes.push(Change::Order { beam: k, order });
@@ -148,7 +150,7 @@ impl Variant {
         }
         // Node numbers keep the places that they have on the mesh of the deck.
         if has_other_nodes && beam.numbering.is_none() && original.names_nodes_of(beam) {
-            let parts = beam.elements.value.iter().map(|count| count * beam.order).collect();
+            let parts = beam.elements.value.iter().map(|division| division.steps(beam.order)).collect();
             changes.push(Change::Numbering { beam: k, parts });
         }
         changes
