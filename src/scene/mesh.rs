@@ -42,6 +42,17 @@ impl BeamElement<'_> {
         }
     }
 
+    /// The piece of the centre line on which it lies.
+    pub fn piece(&self) -> usize {
+        self.beam.part_of_line(self.number).piece
+    }
+
+    /// Its integration points for internal forces: the fraction of the piece, and the section axes
+    /// as columns.
+    pub fn inner_points(&self) -> Vec<(f64, Mat3)> {
+        self.stations(Rule::Inner).iter().map(|station| (station.along, station.axes)).collect()
+    }
+
     /// The section axes of the exact curve at an integration point.
     pub fn exact_axes(&self, station: &Station) -> Mat3 {
         let Part { piece, .. } = self.beam.part_of_line(self.number);

@@ -139,7 +139,7 @@ pub fn of_expected(
 /// one, and others in case it fails.
 fn companions(original: Original, sampler: &Sampler) -> Vec<Vec<Comparison>> {
     let deck = original.deck;
-    let mesher = Mesher { original, sampler, interpolation: None, keeps_places: true };
+    let mesher = Mesher { original, sampler, interpolation: None, keeps_places: true, placement: None };
     let own: Vec<Vec<usize>> = deck.beams.iter().map(Beam::element_counts).collect();
     let safety = |ratio: f64| if ratio < 1.0 { SAFETY_FINER } else { SAFETY_COARSER };
     let mut found = Vec::new();

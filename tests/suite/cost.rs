@@ -327,6 +327,28 @@ fn stretched(output: &str) -> String {
 }
 
 #[test]
+fn placed_elements_are_fewer_where_curvature_is_local() {
+    // The middle is an output: an element ends there on every mesh.
+    let text = stretched("[output]\nnodes = [\"b:20\"]\ncolumns = [\"u\"]\n");
+    let wanted = Accuracy::All(1e-6);
+    let Ok(found) = reached(&text, &wanted) else { panic!("refused") };
+    let meshes = found.meshes.as_ref().expect("both meshes");
+    let placed = meshes.placed.as_ref().expect("a placed mesh");
+    assert!(meshes.is_placed && found.reached && meshes.predicted < 0.8, "{}", meshes.predicted);
+    assert!(4 * placed.elements < 3 * meshes.equal.elements, "{} of {}", placed.elements, meshes.equal.elements);
+    assert!(found.settings()[0].starts_with("beam.0.elements=[[0."), "{:?}", found.settings());
+    assert!(found.settings().iter().any(|setting| setting == "beam.0.numbering=40"));
+    let error = error_with(&text, &found, &Against::Finest);
+    assert!(error <= 1e-6, "{error:e}");
+}
+
+#[test]
+fn equal_elements_stay_where_placing_saves_nothing() {
+    let Ok(found) = reached(&quarter(TIP), &Accuracy::All(1e-8)) else { panic!("refused") };
+    assert!(found.meshes.is_none_or(|meshes| !meshes.is_placed && meshes.placed.is_none()));
+}
+
+#[test]
 fn studies_keep_the_shape_of_a_graded_mesh() {
     let graded = stretched("").replace("elements = 40", "elements = [[0.01, 0.05, 0.5, 0.95, 0.99]]\norder = 3");
     let found = costs(&graded, &Against::Finest, 2);
