@@ -99,7 +99,7 @@ fn largest_difference(a: &Simulation, b: &Simulation, endings: &[&str], rows: us
 /// Asserts that two runs of an arm are equal but for round-off, which stresses and motions amplify.
 fn assert_equal(a: &Simulation, b: &Simulation, what: &str) {
     let motions = largest_difference(a, b, &[".ux", ".uy", ".uz", ".rx", ".ry", ".rz"], STATIC_ROWS);
-    assert!(motions < 1e-12, "{what}: {motions:e} in statics");
+    assert!(motions < 1e-11, "{what}: {motions:e} in statics");
     let all = largest_difference(a, b, &[""], a.rows.len());
     assert!(all < 1e-8, "{what}: {all:e}");
 }
