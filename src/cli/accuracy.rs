@@ -9,9 +9,9 @@ use super::thread_count::cores;
 use super::variant::{describe, paste_lines};
 use super::{console, load, signals};
 use crate::deck::{self, Accuracy, Deck};
-use crate::output::{DeckSource, Film, ReachedAccuracy, ReachedColumn, ResultFolder};
+use crate::output::{DeckSource, Film, ReachedAccuracy, ReachedColumn, ReachedMesh, ReachedMeshes, ResultFolder};
 use crate::scene::Scene;
-use crate::study::accuracy::{Found, reach};
+use crate::study::accuracy::{Found, MeshFound, Meshes, reach};
 use crate::study::cost::{Journal, StudyOptions};
 use crate::study::error_bars::{ErrorBars, error_bars, polylines, refuse_paths};
 use crate::study::{Outcome, StudyError};
@@ -195,6 +195,18 @@ fn reached(found: &Found, wanted: &Accuracy, time: Duration) -> ReachedAccuracy 
         settings: found.settings(),
         runs: found.runs,
         seconds: time.as_secs_f64(),
+        meshes: found.meshes.as_ref().map(meshes),
+    }
+}
+
+fn meshes(found: &Meshes) -> ReachedMeshes {
+    let mesh =
+        |mesh: &MeshFound| ReachedMesh { elements: mesh.elements, estimate: mesh.estimate, seconds: mesh.seconds };
+    ReachedMeshes {
+        equal: mesh(&found.equal),
+        placed: found.placed.as_ref().map(mesh),
+        predicted: found.predicted,
+        is_placed: found.is_placed,
     }
 }
 
@@ -229,5 +241,22 @@ fn print_found(name: &str, deck: &Deck, found: &Found, wanted: &Accuracy) {
     let (column, estimate) = found.worst(wanted);
     console::line(&format!("{name}: estimated error {estimate:.1e} of {column} ({} runs)", found.runs));
     console::line(&format!("  {}", describe(&found.variant)));
+    if let Some(meshes) = &found.meshes {
+        console::line(&format!("  {}", in_words(meshes)));
+    }
     paste_lines(deck, &found.settings()).iter().for_each(|line| console::line(&format!("    {line}")));
+}
+
+/// Equal and placed elements in one line.
+fn in_words(meshes: &Meshes) -> String {
+    let mesh = |kind: &str, mesh: &MeshFound| {
+        let time = if mesh.seconds.is_nan() { String::new() } else { format!(", {:.1e} s", mesh.seconds) };
+        let enough = if mesh.is_reached { "" } else { " (not enough)" };
+        format!("{} {kind} elements: error {:.1e} of {}{enough}{time}", mesh.elements, mesh.estimate, mesh.column)
+    };
+    let equal = mesh("equal", &meshes.equal);
+    match &meshes.placed {
+        Some(placed) => format!("{equal}; {}", mesh("placed", placed)),
+        None => format!("{equal}; placed elements: not fewer (predicted {:.0} %)", 100.0 * meshes.predicted),
+    }
 }

@@ -144,11 +144,19 @@ fn number(value: f64) -> String {
     if value == 0.0 || (1e-5..1e16).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
+/// A positive number with three digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
 fn print_beams(mesh: &Mesh) {
     for beam in &mesh.beams {
         let count = beam.elements.len();
+        let lengths = beam.graded_lengths().map_or(String::new(), |[shortest, longest]| {
+            format!(" and lengths {} to {}", number(rounded(shortest)), number(rounded(longest)))
+        });
         console::line(&format!(
-            "beam {}: length {}, {count} elements of order {}, {} nodes",
+            "beam {}: length {}, {count} elements of order {}{lengths}, {} nodes",
             beam.name,
             number(beam.line.length),
             beam.order,

@@ -8,6 +8,7 @@ pub fn describe(variant: &Variant) -> String {
     let elements = match variant.count() {
         0 => None,
         1 => Some("1 element".into()),
+        count if variant.placement.is_some() => Some(format!("{count} placed elements")),
         count => Some(format!("{count} elements")),
     };
     let pace = match variant.pace {

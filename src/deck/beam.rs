@@ -1,6 +1,7 @@
 //! `[[beam]]`: centre line, sections and mesh of a beam.
 
 use super::diagnostic::{Span, Spanned};
+use super::division::{Division, read_divisions, read_elements};
 use super::history::{HistoryUse, read_history_use};
 use super::point::{PointRef, check_name, read_point_list};
 use super::reader::{Context, Item, Table};
@@ -59,12 +60,12 @@ pub struct Beam {
     pub stations_in: Option<StationsWord>,
     /// Its centre line
     pub path: Path,
-    /// Elements of each piece; one number for all
-    pub elements: Spanned<Vec<usize>>,
+    /// Elements of each piece; one entry for all
+    pub elements: Spanned<Vec<Division>>,
     /// Polynomial order of an element
     pub order: usize,
-    /// Equal parts of each piece that node numbers count; left out: those between nodes
-    pub numbering: Option<Spanned<Vec<usize>>>,
+    /// Parts of each piece that node numbers count; left out: those between nodes
+    pub numbering: Option<Spanned<Vec<Division>>>,
     /// The vector whose normal part is local axis 3
     pub axis3: Option<Spanned<[f64; 3]>>,
     /// Angle of the section about axis 1 at start and end
@@ -77,11 +78,34 @@ pub struct Beam {
     pub span: Span,
 }
 
-/// Most elements a deck may ask for.
-pub const MOST_ELEMENTS: usize = 2_000_000;
+impl Beam {
+    /// The elements of a piece of the centre line.
+    pub fn elements_of(&self, piece: usize) -> &Division {
+        &self.elements.value[piece.min(self.elements.value.len() - 1)]
+    }
+
+    /// The numbers of elements, as many as `elements` has entries.
+    pub fn element_counts(&self) -> Vec<usize> {
+        self.elements.value.iter().map(Division::count).collect()
+    }
+
+    /// The number of pieces of the centre line.
+    pub fn pieces(&self) -> usize {
+        self.path.pieces()
+    }
+}
+
+impl Path {
+    fn pieces(&self) -> usize {
+        match self {
+            Self::Through(points) => points.len().saturating_sub(1),
+            Self::Arc(_) => 1,
+        }
+    }
+}
 
 /// Keys of `[[beam]]`.
-pub(super) const KEYS: [&str; 14] = [
+pub(super) const KEYS: [&str; 15] = [
     "name",
     "section",
     "stations",
@@ -89,6 +113,7 @@ pub(super) const KEYS: [&str; 14] = [
     "through",
     "arc",
     "elements",
+    "grading",
     "order",
     "numbering",
     "axis3",
@@ -108,9 +133,9 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
     }
     let stations_in = table.optional("stations_in", |context, item| Some(context.word(item, "stations_in")?.value));
     let path = read_path(&table);
-    let elements = table.required("elements").and_then(|item| read_counts(context, item, "elements"));
+    let elements = read_elements(&table, path.as_ref().map(Path::pieces));
     let order = table.optional("order", read_order);
-    let numbering = table.optional("numbering", |context, item| read_counts(context, item, "numbering"));
+    let numbering = table.optional("numbering", |context, item| read_divisions(context, item, "numbering"));
     let axis3 = table.vector("axis3");
     let twist = table.vector("twist").map(|t| t.value);
     let interpolation = table.word_or("interpolation", InterpolationWord::Relative);
@@ -217,18 +242,4 @@ fn read_path(table: &Table) -> Option<Path> {
         }
         (None, None) => table.wrong("[[beam]] needs `through` (straight pieces) or `arc` (a circular arc)"),
     }
-}
-
-fn read_counts(context: &Context, item: &Item, key: &str) -> Option<Spanned<Vec<usize>>> {
-    let counts: Vec<Option<usize>> = match item.get_ref() {
-        DeValue::Array(array) => {
-            array.iter().map(|entry| context.whole(entry, 1, MOST_ELEMENTS).map(|n| n.value)).collect()
-        }
-        _ => vec![context.whole(item, 1, MOST_ELEMENTS).map(|n| n.value)],
-    };
-    let value: Vec<usize> = counts.into_iter().collect::<Option<_>>()?;
-    if value.is_empty() {
-        return context.wrong(item.span(), format!("`{key}` must not be empty"));
-    }
-    Some(Spanned { value, span: item.span() })
 }

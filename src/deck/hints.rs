@@ -204,6 +204,7 @@ const SYNONYMS: &[Synonym] = &[
     Synonym { written: &["wall", "wall_thickness", "t"], meant: &["thickness"] },
     Synonym { written: &["b", "depth"], meant: &["width"] },
     Synonym { written: &["mu", "mass_per_length", "m", "mass_per_unit_length", "linear_density", "physics_mass_per_length"], meant: &["rhoA"] },
+    Synonym { written: &["bias", "bias_ratio", "progression", "growth", "growth_rate", "spacing", "expansion", "expansion_ratio", "graded", "space_ratio"], meant: &["grading"] },
     Synonym { written: &["mesh", "n_elements", "num_elements", "nel", "ne", "n", "element", "divisions", "segments", "num_elem", "n_elem", "number_of_elements", "ndiv"], meant: &["elements"] },
     Synonym { written: &["degree", "polynomial_order", "order_elem", "num_node_elem", "nodes_per_element", "n_nodes", "polynomial_degree"], meant: &["order"] },
     Synonym { written: &["path", "polyline", "centerline", "centreline", "geometry"], meant: &["through"] },

@@ -30,7 +30,7 @@ pub use ownership::{OutputKind, may_replace, refuse_no_folder};
 pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale, SectionPicture};
 pub use quantities::{Units, quantity_of};
 pub use record::{
-    DeckSource, FileRecord, FinishedRun, ReachedAccuracy, ReachedColumn, Record, RunSummary, TableRecord, TableSource,
-    WarningRecord,
+    DeckSource, FileRecord, FinishedRun, ReachedAccuracy, ReachedColumn, ReachedMesh, ReachedMeshes, Record,
+    RunSummary, TableRecord, TableSource, WarningRecord,
 };
 pub use report::{Film, Reel, Report};

@@ -69,6 +69,30 @@ pub struct ReachedAccuracy {
     pub runs: usize,
     /// Wall-clock seconds of the search
     pub seconds: f64,
+    /// Equal and placed elements, where both were looked at
+    pub meshes: Option<ReachedMeshes>,
+}
+
+/// Equal elements, and elements placed where the solution varies fast.
+pub struct ReachedMeshes {
+    /// The best mesh of equal elements
+    pub equal: ReachedMesh,
+    /// The best mesh of placed ones, where one was tried
+    pub placed: Option<ReachedMesh>,
+    /// The number of placed elements over that of equal ones, as predicted
+    pub predicted: f64,
+    /// True if the placed elements were taken
+    pub is_placed: bool,
+}
+
+/// A mesh that a search found.
+pub struct ReachedMesh {
+    /// The number of its elements
+    pub elements: usize,
+    /// The estimated error of the worst column
+    pub estimate: f64,
+    /// CPU seconds of its run
+    pub seconds: f64,
 }
 
 /// The accuracy of a column. Errors are relative to the largest value of the column's kind.
@@ -242,6 +266,28 @@ struct AccuracyRecord {
     settings: Vec<String>,
     runs: usize,
     seconds: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    meshes: Option<MeshesRecord>,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+struct MeshesRecord {
+    equal: MeshRecord,
+    placed: Option<MeshRecord>,
+    /// The number of placed elements over that of equal ones, as predicted
+    predicted: Number,
+    /// `equal` or `placed`
+    taken: String,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+struct MeshRecord {
+    elements: usize,
+    estimate: Number,
+    /// CPU seconds of its run
+    seconds: Number,
 }
 
 /// A failure: its name and message, and the numbers that its kind has. It is only written: a record
@@ -510,6 +556,23 @@ impl From<ReachedAccuracy> for AccuracyRecord {
             settings: reached.settings,
             runs: reached.runs,
             seconds: reached.seconds,
+            meshes: reached.meshes.map(MeshesRecord::from),
+        }
+    }
+}
+
+impl From<ReachedMeshes> for MeshesRecord {
+    fn from(meshes: ReachedMeshes) -> Self {
+        let record = |ReachedMesh { elements, estimate, seconds }: ReachedMesh| MeshRecord {
+            elements,
+            estimate: Number(estimate),
+            seconds: Number(seconds),
+        };
+        Self {
+            equal: record(meshes.equal),
+            placed: meshes.placed.map(record),
+            predicted: Number(meshes.predicted),
+            taken: if meshes.is_placed { "placed" } else { "equal" }.into(),
         }
     }
 }

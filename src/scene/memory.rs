@@ -80,13 +80,9 @@ fn need(deck: &Deck) -> MemoryNeed {
 
 /// The number of nodes of a beam; a number that no integer holds is possible here.
 fn nodes_of(beam: &deck::Beam) -> f64 {
-    let pieces = match &beam.path {
-        deck::Path::Through(points) => points.len().saturating_sub(1),
-        deck::Path::Arc(_) => 1,
-    };
     let elements: f64 = match &beam.elements.value[..] {
-        [count] => *count as f64 * pieces as f64,
-        counts => counts.iter().map(|&count| count as f64).sum(),
+        [division] => division.count() as f64 * beam.pieces() as f64,
+        divisions => divisions.iter().map(|division| division.count() as f64).sum(),
     };
     elements * beam.order as f64
 }

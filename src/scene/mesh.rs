@@ -1,9 +1,9 @@
 //! From centre lines to nodes and elements.
 
 use super::names;
-use super::path::{self, CentreLine};
+use super::path::{self, CentreLine, Cover};
 use super::section::{self, SectionCourse};
-use crate::deck::{self, Deck, Diagnostic, JointParts, PointRef, Spanned, StationsWord};
+use crate::deck::{self, Deck, Diagnostic, Division, JointParts, PointRef, Spanned, StationsWord};
 use beamsim_core::model::Names;
 use beamsim_core::model::beam_element::{ElementGeometry, PlacedNode, Rule, Station, shape_at};
 use beamsim_core::system::Node;
@@ -26,11 +26,11 @@ pub struct BeamElement<'m> {
 
 impl BeamElement<'_> {
     fn station(&self, xi: f64, gauss_weight: f64) -> Station {
-        let Part { piece, number, count } = self.beam.part_of_line(self.number);
+        let Part { piece, cover, .. } = self.beam.part_of_line(self.number);
         let line = &self.beam.line;
         let (shape, slope) = shape_at(self.nodes.len(), xi);
-        let (tangent, jacobian) = line.pieces[piece].slope(self.between(&slope), count);
-        let t = (number as f64 + 0.5 * (xi + 1.0)) / count as f64;
+        let (tangent, jacobian) = line.pieces[piece].slope(self.between(&slope), cover);
+        let t = cover.place(xi);
         let fraction = line.fraction(piece, t);
         Station {
             slope: slope.map(|d| d / jacobian),
@@ -40,6 +40,17 @@ impl BeamElement<'_> {
             axes: line.axes(piece, tangent, fraction),
             along: t,
         }
+    }
+
+    /// The piece of the centre line on which it lies.
+    pub fn piece(&self) -> usize {
+        self.beam.part_of_line(self.number).piece
+    }
+
+    /// Its integration points for internal forces: the fraction of the piece, and the section axes
+    /// as columns.
+    pub fn inner_points(&self) -> Vec<(f64, Mat3)> {
+        self.stations(Rule::Inner).iter().map(|station| (station.along, station.axes)).collect()
     }
 
     /// The section axes of the exact curve at an integration point.
@@ -64,14 +75,14 @@ impl ElementGeometry for BeamElement<'_> {
     }
 
     fn arms<const N: usize>(&self) -> [Vec3; N] {
-        let Part { piece, count, .. } = self.beam.part_of_line(self.number);
-        self.beam.line.pieces[piece].arms(std::array::from_fn(|i| self.node(i).place), count)
+        let Part { piece, cover, .. } = self.beam.part_of_line(self.number);
+        self.beam.line.pieces[piece].arms(std::array::from_fn(|i| self.node(i).place), cover)
     }
 
     fn rounding(&self) -> f64 {
-        let Part { piece, count, .. } = self.beam.part_of_line(self.number);
+        let Part { piece, cover, .. } = self.beam.part_of_line(self.number);
         let chord = self.node(self.count() - 1).place - self.node(0).place;
-        self.beam.line.pieces[piece].rounding(chord, count)
+        self.beam.line.pieces[piece].rounding(chord, cover)
     }
 
     fn stations(&self, rule: Rule) -> Vec<Station> {
@@ -95,6 +106,8 @@ pub struct MeshBeam {
     /// First element of each piece of its centre line, counted from that of the beam, and at last
     /// their number
     piece_starts: Vec<usize>,
+    /// The elements of each piece
+    divisions: Vec<Division>,
     /// Nodes of an element, less one
     pub order: usize,
     /// Interpolation of rotations
@@ -118,26 +131,48 @@ impl MeshBeam {
     /// before that.
     pub fn along(&self, fraction: f64) -> (usize, f64) {
         let (element, xi) = self.element_at(fraction);
-        let Part { piece, number, count } = self.part_of_line(element);
-        (piece, (number as f64 + 0.5 * (xi + 1.0)) / count as f64)
+        let Part { piece, number, .. } = self.part_of_line(element);
+        (piece, self.divisions[piece].along(number, 0.5 * (xi + 1.0)))
     }
 
     /// The part of the centre line on which an element lies.
     fn part_of_line(&self, element: usize) -> Part {
         let number = element - self.elements.start;
         let piece = self.piece_starts.partition_point(|&start| start <= number) - 1;
-        let start = self.piece_starts[piece];
-        let end = self.piece_starts[piece + 1];
-        Part { piece, number: number - start, count: end - start }
+        let number = number - self.piece_starts[piece];
+        let division = &self.divisions[piece];
+        let cover = match division {
+            Division::Equal(count) => Cover::Equal { number, count: *count },
+            Division::Graded { .. } | Division::At(_) => {
+                Cover::Between { start: division.end(number), end: division.end(number + 1) }
+            }
+        };
+        Part { piece, number, cover }
+    }
+
+    /// The lengths of the shortest and the longest element, where those of a piece differ.
+    pub fn graded_lengths(&self) -> Option<[f64; 2]> {
+        (0..self.divisions.len()).find(|&piece| self.graded_count(piece).is_some())?;
+        let ends: Vec<f64> = self.fractions.iter().step_by(self.order).copied().collect();
+        let lengths = ends.windows(2).map(|pair| (pair[1] - pair[0]) * self.line.length);
+        Some(lengths.fold([f64::INFINITY, 0.0], |[least, most], one| [least.min(one), most.max(one)]))
+    }
+
+    /// The number of elements of a piece, where their lengths differ.
+    pub fn graded_count(&self, piece: usize) -> Option<usize> {
+        match &self.divisions[piece] {
+            Division::Equal(_) => None,
+            division @ (Division::Graded { .. } | Division::At(_)) => Some(division.count()),
+        }
     }
 }
 
-/// One of some equal parts of a piece of a centre line.
+/// The part of a centre line on which an element lies.
 struct Part {
     piece: usize,
-    /// From 0
+    /// The number of the element in its piece, from 0
     number: usize,
-    count: usize,
+    cover: Cover,
 }
 
 /// All nodes, beams and elements.
@@ -337,11 +372,9 @@ impl Mesh {
         section: SectionCourse,
         diagnostics: &mut Vec<Diagnostic>,
     ) {
-        let counts = &beam.elements.value;
-        let count = |piece: usize| counts[piece.min(counts.len() - 1)];
+        let count = |piece: usize| beam.elements_of(piece).count();
         let corners: Vec<Option<&str>> = corner_names(&beam.path);
-        let between =
-            named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
+        let between = named_between(beam, &line, &|name| names::point(deck, name));
         let first_element = self.element_count;
         let all = (0..line.pieces.len()).map(count).sum::<usize>() * beam.order + 1;
         let mut nodes = Vec::with_capacity(all);
@@ -349,7 +382,7 @@ impl Mesh {
         for piece in 0..line.pieces.len() {
             let steps = count(piece) * beam.order;
             for step in usize::from(piece > 0)..=steps {
-                let t = step as f64 / steps as f64;
+                let t = beam.elements_of(piece).node(step, beam.order);
                 let corner = match step {
                     0 => corners[piece],
                     _ if step == steps => corners[piece + 1],
@@ -383,6 +416,7 @@ impl Mesh {
             numbered: beam.numbering.as_ref().map(|numbering| fractions_of(&line, &numbering.value)),
             elements: first_element..self.element_count,
             piece_starts,
+            divisions: (0..line.pieces.len()).map(|piece| beam.elements_of(piece).clone()).collect(),
             order: beam.order,
             interpolation: beam.interpolation,
             free_strain: beam.free_strain.clone(),
@@ -411,11 +445,11 @@ impl Mesh {
     }
 }
 
-/// The fractions of the length where the pieces of a line are cut into so many equal parts, from start to end.
-fn fractions_of(line: &CentreLine, parts: &[usize]) -> Vec<f64> {
+/// The fractions of the length where the parts of the pieces of a line end, from start to end.
+fn fractions_of(line: &CentreLine, divisions: &[Division]) -> Vec<f64> {
     let inner = (0..line.pieces.len()).flat_map(|piece| {
-        let count = parts[piece.min(parts.len() - 1)];
-        (1..=count).map(move |part| line.fraction(piece, part as f64 / count as f64))
+        let division = &divisions[piece.min(divisions.len() - 1)];
+        (1..=division.count()).map(move |part| line.fraction(piece, division.end(part)))
     });
     std::iter::once(0.0).chain(inner).collect()
 }
@@ -436,14 +470,24 @@ fn corner_names(path: &deck::Path) -> Vec<Option<&str>> {
 
 /// The named middle point of an arc and its step, where the mesh puts a node there.
 fn named_between<'a>(
-    path: &'a deck::Path,
+    beam: &'a deck::Beam,
     line: &CentreLine,
-    steps: impl Fn(usize) -> usize,
     place: &dyn Fn(&str) -> Option<Vec3>,
 ) -> Option<(&'a str, usize)> {
-    let deck::Path::Arc([_, Spanned { value: PointRef::Name(name), .. }, _]) = path else { return None };
-    let at = line.find(place(name)?)? * steps(0) as f64;
-    ((at - at.round()).abs() < 1e-9).then(|| (name.as_str(), at.round() as usize))
+    let deck::Path::Arc([_, Spanned { value: PointRef::Name(name), .. }, _]) = &beam.path else { return None };
+    let at = line.find(place(name)?)?;
+    let division = beam.elements_of(0);
+    let steps = division.count() * beam.order;
+    let step = match division {
+        Division::Equal(_) => {
+            let step = at * steps as f64;
+            ((step - step.round()).abs() < 1e-9).then_some(step.round() as usize)
+        }
+        Division::Graded { .. } | Division::At(_) => {
+            (0..=steps).find(|&step| (division.node(step, beam.order) - at).abs() < 1e-9)
+        }
+    };
+    step.map(|step| (name.as_str(), step))
 }
 
 /// True if the path of a beam names a point.
@@ -459,12 +503,10 @@ fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
 fn count_nodes(deck: &Deck) -> Result<usize, Diagnostic> {
     let mut total = 0_usize;
     for beam in &deck.beams {
-        let pieces = match &beam.path {
-            deck::Path::Through(points) => points.len() - 1,
-            deck::Path::Arc(_) => 1,
+        let elements = match &beam.elements.value[..] {
+            [division] => division.count().saturating_mul(beam.pieces()),
+            divisions => divisions.iter().map(Division::count).sum(),
         };
-        let counts = &beam.elements.value;
-        let elements = if counts.len() == 1 { counts[0].saturating_mul(pieces) } else { counts.iter().sum() };
         total = total.saturating_add(elements.saturating_mul(beam.order));
         if total > deck::MOST_ELEMENTS {
             let message = format!("more nodes than the limit of {}", deck::MOST_ELEMENTS);

@@ -32,7 +32,7 @@ use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::integrate::Scheme;
 use beamsim_core::model::{ElementInfo, ModelParts, StageKind};
 use beamsim_core::probe::{Figure, Need, Probe};
-use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, TimeStepping, Until, Warning};
+use beamsim_core::run::{Approach, InitialMotion, Plan, Snapshot, Stage, StageWork, TimeStepping, Until, Warning};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
@@ -74,6 +74,32 @@ impl Scene {
     /// Its whole shape, for pictures.
     pub fn figure(&self) -> Figure {
         figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity)
+    }
+
+    /// All texts of the deck that may name a place on a beam.
+    pub fn places_in_texts(&self) -> Vec<&str> {
+        fn collect<'a>(value: &'a serde_json::Value, found: &mut Vec<&'a str>) {
+            match value {
+                serde_json::Value::String(text) if text.contains(['@', ':']) => found.push(text),
+                serde_json::Value::Array(entries) => entries.iter().for_each(|entry| collect(entry, found)),
+                serde_json::Value::Object(entries) => entries.values().for_each(|entry| collect(entry, found)),
+                serde_json::Value::String(_)
+                | serde_json::Value::Null
+                | serde_json::Value::Bool(_)
+                | serde_json::Value::Number(_) => {}
+            }
+        }
+        let mut found = Vec::new();
+        collect(&self.resolved, &mut found);
+        found
+    }
+
+    /// Gamma, K, N and M at the integration points of an element, material and in global
+    /// components.
+    pub fn stresses(&self, element: usize, at: &Snapshot) -> Vec<[[f64; 3]; 4]> {
+        let fields = &mut self.elasticity.iter();
+        let values = fields.find_map(|field| field.at_points(element as u32, at.state, at.origin)).unwrap_or_default();
+        values.iter().map(|(strain, stress)| [strain.gamma.0, strain.kappa.0, stress.n.0, stress.m.0]).collect()
     }
 }
 

@@ -66,10 +66,12 @@ pub struct Spot {
     pub beam: usize,
     /// The piece of its centre line
     pub piece: usize,
-    /// The part of the nodes of that piece that lie before it, from 0 to 1
+    /// The part of the elements of that piece that lie before it, from 0 to 1
     pub along: f64,
     /// True if it is a node
     pub is_node: bool,
+    /// The number of elements of the piece, where their lengths differ
+    pub graded: Option<usize>,
 }
 
 impl Mesh {
@@ -81,7 +83,8 @@ impl Mesh {
             Found::Between(beam, fraction) => (beam, fraction, false),
         };
         let (piece, along) = self.beams[beam].along(fraction);
-        Some(Spot { beam, piece, along, is_node })
+        let graded = self.beams[beam].graded_count(piece);
+        Some(Spot { beam, piece, along, is_node, graded })
     }
 
     /// Looks a name up: a point, `beam@start`, `beam@end`, `beam@0.25`, `beam:3`.
@@ -240,6 +243,9 @@ impl MeshBeam {
 /// Advice: the number of elements that puts a node at a fraction of the length.
 pub fn propose(beam: &MeshBeam, fraction: f64) -> String {
     let (piece, t) = beam.line.locate(fraction);
+    if beam.graded_count(piece).is_some() {
+        return format!("let an element end there: at {t:.9} of piece {} in the list of `elements`", piece + 1);
+    }
     let whole = |n: &usize| {
         let place = t * (n * beam.order) as f64;
         (place - place.round()).abs() < 1e-9

@@ -31,6 +31,51 @@ enum Curve {
     },
 }
 
+/// The part of a piece that an element covers. Places are fractions of the length of the piece.
+#[derive(Clone, Copy, Debug)]
+pub enum Cover {
+    /// One of some equal parts
+    Equal {
+        /// From 0
+        number: usize,
+        /// The number of parts
+        count: usize,
+    },
+    /// From one place to another
+    Between {
+        /// The first place
+        start: f64,
+        /// The last place
+        end: f64,
+    },
+}
+
+impl Cover {
+    /// The place at xi, which goes from -1 to 1.
+    pub fn place(self, xi: f64) -> f64 {
+        match self {
+            Self::Equal { number, count } => (number as f64 + 0.5 * (xi + 1.0)) / count as f64,
+            Self::Between { start, end } => start + 0.5 * (xi + 1.0) * (end - start),
+        }
+    }
+
+    /// This part of a length.
+    fn of(self, length: f64) -> f64 {
+        match self {
+            Self::Equal { count, .. } => length / count as f64,
+            Self::Between { start, end } => length * (end - start),
+        }
+    }
+
+    /// The way to a node, in pieces, where the part has `steps` equal steps between nodes.
+    fn way(self, node: usize, steps: usize) -> f64 {
+        match self {
+            Self::Equal { count, .. } => node as f64 / (steps * count) as f64,
+            Self::Between { start, end } => (end - start) * (node as f64 / steps as f64),
+        }
+    }
+}
+
 /// The centre line of a beam with its section axes.
 #[derive(Clone, Debug)]
 pub struct CentreLine {
@@ -72,29 +117,29 @@ impl Piece {
         }
     }
 
-    /// The unit tangent of one of so many equal elements and its length over that of xi; `stretch`:
-    /// derivative of the interpolated line over xi. On a straight piece all elements have the same,
-    /// without the round-off in the places of their nodes, so that they can share data.
-    pub fn slope(&self, stretch: Vec3, elements: usize) -> (Vec3, f64) {
+    /// The unit tangent of an element and its length over that of xi; `stretch`: derivative of the
+    /// interpolated line over xi. On a straight piece equal elements have the same, without the
+    /// round-off in the places of their nodes, so that they can share data.
+    pub fn slope(&self, stretch: Vec3, cover: Cover) -> (Vec3, f64) {
         match &self.curve {
-            Curve::Line => (self.tangent(0.0), 0.5 * self.length / elements as f64),
+            Curve::Line => (self.tangent(0.0), cover.of(0.5 * self.length)),
             Curve::Arc { .. } => (stretch * (1.0 / stretch.norm()), stretch.norm()),
         }
     }
 
-    /// The chord of one of so many equal elements relative to its part of a straight piece: 1 but
-    /// for round-off in the places of its nodes.
-    pub fn rounding(&self, chord: Vec3, elements: usize) -> f64 {
-        match &self.curve {
-            Curve::Line => chord.norm() * elements as f64 / self.length,
-            Curve::Arc { .. } => 1.0,
+    /// The chord of an element relative to its part of a straight piece: 1 but for round-off in the
+    /// places of its nodes.
+    pub fn rounding(&self, chord: Vec3, cover: Cover) -> f64 {
+        match (&self.curve, cover) {
+            (Curve::Line, Cover::Equal { count, .. }) => chord.norm() * count as f64 / self.length,
+            (Curve::Line, Cover::Between { .. }) => chord.norm() / cover.of(self.length),
+            (Curve::Arc { .. }, _) => 1.0,
         }
     }
 
-    /// The way from the first node of one of so many equal elements to the next ones, where these
-    /// stand at `places`.
-    pub fn arms<const N: usize>(&self, places: [Vec3; N], elements: usize) -> [Vec3; N] {
-        let straight = |i: usize| (self.end - self.start) * (i as f64 / ((N - 1) * elements) as f64);
+    /// The way from the first node of an element to the next ones, where these stand at `places`.
+    pub fn arms<const N: usize>(&self, places: [Vec3; N], cover: Cover) -> [Vec3; N] {
+        let straight = |i: usize| (self.end - self.start) * cover.way(i, N - 1);
         match &self.curve {
             Curve::Line => std::array::from_fn(straight),
             Curve::Arc { .. } => places.map(|place| place - places[0]),

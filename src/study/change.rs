@@ -7,8 +7,8 @@
 
 use super::error::StudyError;
 use crate::deck::{
-    Beam, Deck, InterpolationWord, MOST_ELEMENTS, MOST_STEPS, STEP_TOLERANCE, SchemeName, Span, Spanned, Stage,
-    StageBody, Words,
+    Beam, Deck, Division, InterpolationWord, MOST_STEPS, STEP_TOLERANCE, SchemeName, Span, Spanned, Stage, StageBody,
+    Words,
 };
 use std::fmt::{self, Display, Formatter};
 
@@ -19,8 +19,8 @@ pub enum Change {
     Elements {
         /// The beam
         beam: usize,
-        /// The numbers of elements
-        counts: Vec<usize>,
+        /// The elements
+        divisions: Vec<Division>,
     },
     /// The order of the elements of a beam
     Order {
@@ -36,12 +36,12 @@ pub enum Change {
         /// The interpolation
         word: InterpolationWord,
     },
-    /// The number of equal parts of each piece of a beam that node numbers count
+    /// The parts of each piece of a beam that node numbers count
     Numbering {
         /// The beam
         beam: usize,
-        /// The numbers of parts
-        parts: Vec<usize>,
+        /// The parts
+        parts: Vec<Division>,
     },
     /// The scheme of a dynamic stage, with the coefficients of the deck where it has them
     Scheme {
@@ -95,13 +95,13 @@ impl Change {
     /// `None` where the deck has no such beam or stage, or the value is out of bounds.
     fn apply(&self, deck: &mut Deck) -> Option<()> {
         match self {
-            Self::Elements { beam, counts } => {
-                beam_of(deck, *beam)?.elements.value = counted(counts)?;
+            Self::Elements { beam, divisions } => {
+                beam_of(deck, *beam)?.elements.value = possible(divisions)?;
             }
             Self::Order { beam, order } => beam_of(deck, *beam)?.order = *order,
             Self::Interpolation { beam, word } => beam_of(deck, *beam)?.interpolation = *word,
             Self::Numbering { beam, parts } => {
-                let numbering = Spanned { value: counted(parts)?, span: Span::default() };
+                let numbering = Spanned { value: possible(parts)?, span: Span::default() };
                 beam_of(deck, *beam)?.numbering = Some(numbering);
             }
             Self::Tolerance { stage, tolerance } => {
@@ -147,16 +147,16 @@ fn stage_of(deck: &mut Deck, stage: usize) -> Option<&mut Stage> {
     deck.stages.get_mut(stage)
 }
 
-/// Numbers of elements or parts, where each is within its bounds.
-fn counted(counts: &[usize]) -> Option<Vec<usize>> {
-    counts.iter().all(|count| (1..=MOST_ELEMENTS).contains(count)).then(|| counts.to_vec())
+/// Elements or parts, where each piece is within its bounds.
+fn possible(divisions: &[Division]) -> Option<Vec<Division>> {
+    divisions.iter().all(Division::is_possible).then(|| divisions.to_vec())
 }
 
 /// The setting that makes the change: `beam.0.elements=8`.
 impl Display for Change {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
         match self {
-            Self::Elements { beam, counts } => write!(f, "beam.{beam}.elements={}", list(counts)),
+            Self::Elements { beam, divisions } => write!(f, "beam.{beam}.elements={}", list(divisions)),
             Self::Order { beam, order } => write!(f, "beam.{beam}.order={order}"),
             Self::Interpolation { beam, word } => write!(f, "beam.{beam}.interpolation={:?}", word.word()),
             Self::Numbering { beam, parts } => write!(f, "beam.{beam}.numbering={}", list(parts)),
@@ -169,10 +169,18 @@ impl Display for Change {
     }
 }
 
-fn list(counts: &[usize]) -> String {
-    match counts {
-        [one] => one.to_string(),
-        several => format!("{several:?}").replace(' ', ""),
+/// Divisions as in a deck, where a key of its own gives the grading.
+fn list(divisions: &[Division]) -> String {
+    match divisions {
+        [Division::Equal(count) | Division::Graded { count, .. }] => count.to_string(),
+        several => format!("[{}]", several.iter().map(entry).collect::<Vec<_>>().join(",")),
+    }
+}
+
+fn entry(division: &Division) -> String {
+    match division {
+        Division::Equal(count) | Division::Graded { count, .. } => count.to_string(),
+        Division::At(ends) => format!("{ends:?}").replace(' ', ""),
     }
 }
 
@@ -212,11 +220,11 @@ mod tests {
             "scheme = \"generalized_alpha\"\nrho_inf = 0.5",
         ];
         let mut changes = vec![
-            Change::Elements { beam: 0, counts: vec![4, 6] },
-            Change::Elements { beam: 0, counts: vec![5] },
+            Change::Elements { beam: 0, divisions: vec![Division::Equal(4), Division::At(vec![0.1, 1.0 / 3.0])] },
+            Change::Elements { beam: 0, divisions: vec![Division::Equal(5)] },
             Change::Order { beam: 0, order: 3 },
             Change::Interpolation { beam: 0, word: InterpolationWord::Total },
-            Change::Numbering { beam: 0, parts: vec![2, 3] },
+            Change::Numbering { beam: 0, parts: vec![Division::At(vec![0.25]), Division::Equal(3)] },
             Change::Step { stage: 0, step: 0.1 / 3.0 },
             Change::Adaptive { stage: 0, adaptive: true },
             Change::Adaptive { stage: 0, adaptive: false },
@@ -241,8 +249,9 @@ mod tests {
     fn values_out_of_bounds_are_refused() {
         let deck = read(&DECK.replace("SCHEME", ""));
         for change in [
-            Change::Elements { beam: 0, counts: vec![0] },
-            Change::Elements { beam: 1, counts: vec![1] },
+            Change::Elements { beam: 0, divisions: vec![Division::Equal(0)] },
+            Change::Elements { beam: 0, divisions: vec![Division::At(vec![0.4, 0.2])] },
+            Change::Elements { beam: 1, divisions: vec![Division::Equal(1)] },
             Change::Step { stage: 0, step: 1e-12 },
             Change::Step { stage: 1, step: 0.1 },
             Change::Tolerance { stage: 0, tolerance: 1.0 },

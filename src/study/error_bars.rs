@@ -9,7 +9,7 @@ use super::StudyError;
 use super::accuracy::{divisor_in_time, divisors_in_space, left_by_newton};
 use super::cost::{Companion, Family, Mesher, Original, Pace, Patience, Sampler, Variant, dynamic_stages, trial};
 use super::outcome::{Outcome, Presence, StageClock};
-use crate::deck::{Deck, Diagnostic, Path, PointRef, Spanned, StageBody};
+use crate::deck::{Beam, Deck, Diagnostic, Path, PointRef, Spanned, StageBody};
 use crate::output::{SavedBars, SavedCompanion, SideColumns};
 use crate::scene::Scene;
 use beamsim_core::run::Failure;
@@ -139,8 +139,8 @@ pub fn of_expected(
 /// one, and others in case it fails.
 fn companions(original: Original, sampler: &Sampler) -> Vec<Vec<Comparison>> {
     let deck = original.deck;
-    let mesher = Mesher { original, sampler, interpolation: None, keeps_places: true };
-    let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
+    let mesher = Mesher { original, sampler, interpolation: None, keeps_places: true, placement: None };
+    let own: Vec<Vec<usize>> = deck.beams.iter().map(Beam::element_counts).collect();
     let safety = |ratio: f64| if ratio < 1.0 { SAFETY_FINER } else { SAFETY_COARSER };
     let mut found = Vec::new();
     if let Some(order) = deck.beams.iter().map(|beam| beam.order).min() {

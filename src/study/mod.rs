@@ -12,6 +12,7 @@ pub mod forecast;
 mod outcome;
 mod parallel;
 mod scale;
+mod strains;
 pub mod sweep;
 mod verify;
 

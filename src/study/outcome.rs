@@ -4,6 +4,7 @@ use crate::deck::{Diagnostic, Spanned, is_named, nearest};
 use crate::output::{HistoryReader, ModesWriter};
 use crate::scene::Scene;
 use crate::study::Recorder;
+use crate::study::strains::StrainRecord;
 use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, Stage, StageResult};
 use std::time::Instant;
 
@@ -39,6 +40,8 @@ pub struct Outcome {
     pub counters: Counters,
     /// Wall-clock seconds
     pub seconds: f64,
+    /// Strains along beams, where a record was given
+    pub(in crate::study) strains: Option<StrainRecord>,
 }
 
 impl Outcome {
@@ -50,9 +53,21 @@ impl Outcome {
         most_attempts: u64,
         interrupted: &dyn Fn() -> Option<i32>,
     ) -> Self {
+        Self::with_strains(scene, recorder, None, most_attempts, interrupted)
+    }
+
+    /// Runs a scene likewise, and records its strains where a record is given.
+    pub(in crate::study) fn with_strains(
+        scene: &Scene,
+        recorder: Option<Recorder>,
+        strains: Option<StrainRecord>,
+        most_attempts: u64,
+        interrupted: &dyn Fn() -> Option<i32>,
+    ) -> Self {
         let mut collector = OutputCollector {
             scene,
             recorder,
+            strains,
             moments: Vec::new(),
             rows: Vec::new(),
             found: ModesWriter::default(),
@@ -64,10 +79,10 @@ impl Outcome {
         let start = Instant::now();
         let (ended, counters) = Run::new(scene.plan.clone(), &mut collector).finish();
         let seconds = start.elapsed().as_secs_f64();
-        let OutputCollector { recorder, moments, rows, found, modes, attempts, .. } = collector;
+        let OutputCollector { recorder, strains, moments, rows, found, modes, attempts, .. } = collector;
         let expected = recorder.map_or(Vec::new(), |recorder| recorder.values());
         let dynamic = are_dynamic(scene);
-        Self { ended, dynamic, moments, rows, found, modes, expected, attempts, counters, seconds }
+        Self { ended, dynamic, moments, rows, found, modes, expected, attempts, counters, seconds, strains }
     }
 
     /// The rows of a run that finished, without its other results.
@@ -83,6 +98,7 @@ impl Outcome {
             attempts: 0,
             counters: Counters::default(),
             seconds: 0.0,
+            strains: None,
         }
     }
 
@@ -179,6 +195,7 @@ impl Outcome {
             attempts: 0,
             counters: Counters::default(),
             seconds: 0.0,
+            strains: None,
         }
     }
 }
@@ -222,6 +239,7 @@ fn columns_of(number: usize, stage: &Stage) -> Vec<String> {
 struct OutputCollector<'a> {
     scene: &'a Scene,
     recorder: Option<Recorder>,
+    strains: Option<StrainRecord>,
     moments: Vec<Moment>,
     rows: Vec<Vec<f64>>,
     found: ModesWriter,
@@ -246,6 +264,7 @@ impl Observer for OutputCollector<'_> {
         self.moments.push(at.moment());
         self.rows.push(row);
         self.recorder.iter_mut().for_each(|recorder| recorder.row(at));
+        self.strains.iter_mut().for_each(|strains| strains.row(self.scene, at));
         Ok(())
     }
 

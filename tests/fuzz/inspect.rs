@@ -3,7 +3,7 @@
 use super::generate::Corpus;
 use super::input::{Input, Language, TABLE};
 use super::process;
-use beamsim::deck::{self, Beam, Deck, Diagnostic, Expression, Path, Severity, SweepFile, Unreadable};
+use beamsim::deck::{self, Beam, Deck, Diagnostic, Expression, Severity, SweepFile, Unreadable};
 use beamsim::output::HistoryReader;
 use beamsim::{scene, study};
 use std::panic::{self, AssertUnwindSafe};
@@ -92,15 +92,9 @@ fn inspect_deck(input: &Input, corpus: &Corpus) -> Verdict {
 
 /// The number of elements that a deck asks for.
 fn elements(deck: &Deck) -> usize {
-    let of_beam = |beam: &Beam| {
-        let pieces = match &beam.path {
-            Path::Through(points) => points.len().saturating_sub(1),
-            Path::Arc(_) => 1,
-        };
-        match &beam.elements.value[..] {
-            [each] => each.saturating_mul(pieces),
-            several => several.iter().fold(0, |sum: usize, count| sum.saturating_add(*count)),
-        }
+    let of_beam = |beam: &Beam| match &beam.elements.value[..] {
+        [each] => each.count().saturating_mul(beam.pieces()),
+        several => several.iter().fold(0, |sum: usize, division| sum.saturating_add(division.count())),
     };
     deck.beams.iter().map(of_beam).fold(0, usize::saturating_add)
 }

@@ -325,6 +325,38 @@ fn a_search_gives_up_steps_that_fail() {
     assert_eq!(record["accuracy"]["runs"], 4);
 }
 
+/// A stretched strip whose curvature decays within a fortieth of its length.
+const STRETCHED: &str = "[point]\nroot = [0, 0, 0]\nend = [1, 0, 0]\n[section.s]\nEA = 1e6\nGA = 1e6\nGJ = 20\nEI = 1\n\
+     [[beam]]\nname = \"strip\"\nsection = \"s\"\nthrough = [\"root\", \"end\"]\nelements = 40\n\
+     [[support]]\nat = \"root\"\nfix = \"all\"\n[[support]]\nat = \"end\"\nfix = [\"uy\", \"uz\", \"rx\", \"ry\", \"rz\"]\n\
+     [[load]]\nat = \"end\"\nforce = [1600, 0, 0]\n[[load]]\nat = \"strip@0.4\"\nforce = [0, 0, -500]\n\
+     [[stage]]\nkind = \"static\"\nsteps = 4\n[output]\nnodes = [\"strip:16\"]\ncolumns = [\"u\"]\n";
+
+#[test]
+fn placed_elements_are_told_beside_equal_ones() {
+    let folder = Folder::new("placed");
+    folder.write("deck.toml", STRETCHED);
+    let output = folder.beamsim(&["run", "deck.toml", "--accuracy", "1e-6"]);
+    assert_eq!(status(&output), 0, "{}", last_line(&output));
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains(" equal elements: error ") && text.contains(" placed elements: error "), "{text}");
+    assert!(text.contains("    elements = [[0."), "{text}");
+    let record: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.0.join("results/deck/run.json")).unwrap()).unwrap();
+    let found = &record["accuracy"];
+    let meshes = &found["meshes"];
+    assert_eq!(meshes["taken"], "placed");
+    assert!(meshes["placed"]["elements"].as_u64().unwrap() < meshes["equal"]["elements"].as_u64().unwrap());
+    assert!(meshes["placed"]["estimate"].as_f64().unwrap() <= 1e-6 && meshes["predicted"].as_f64().unwrap() < 0.8);
+    let settings: Vec<&str> = found["settings"].as_array().unwrap().iter().map(|s| s.as_str().unwrap()).collect();
+    let again: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
+    assert_eq!(status(&folder.beamsim(&[&["run", "deck.toml", "--out", "again"][..], &again].concat())), 0);
+    let history = fs::read(folder.0.join("results/deck/history.csv")).unwrap();
+    assert_eq!(history, fs::read(folder.0.join("again/history.csv")).unwrap());
+    let check = folder.beamsim(&[&["check", "deck.toml"][..], &again].concat());
+    assert!(String::from_utf8_lossy(&check.stdout).contains(" elements of order 3 and lengths 0.0"));
+}
+
 #[test]
 fn run_reaches_an_accuracy_and_says_with_what() {
     let folder = Folder::new("accuracy");

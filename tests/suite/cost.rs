@@ -314,6 +314,50 @@ fn a_wanted_accuracy_is_reached_and_estimates_are_above_errors() {
     }
 }
 
+/// A stretched strip that is clamped at both ends, under a load across: its curvature decays within a hundredth of its length.
+fn stretched(output: &str) -> String {
+    format!(
+        "[point]\nroot = [0, 0, 0]\nend = [1, 0, 0]\n[section.s]\nEA = 1e6\nGA = 1e6\nGJ = 20\nEI = 1\n\
+         [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"end\"]\nelements = 40\n\
+         [[support]]\nat = \"root\"\nfix = \"all\"\n\
+         [[support]]\nat = \"end\"\nfix = [\"uy\", \"uz\", \"rx\", \"ry\", \"rz\"]\n\
+         [[load]]\nat = \"end\"\nforce = [1e4, 0, 0]\n[[load]]\nalong = \"b\"\nforce = [0, 0, -5e3]\n\
+         [[stage]]\nkind = \"static\"\nsteps = 4\n{output}"
+    )
+}
+
+#[test]
+fn placed_elements_are_fewer_where_curvature_is_local() {
+    // The middle is an output: an element ends there on every mesh.
+    let text = stretched("[output]\nnodes = [\"b:20\"]\ncolumns = [\"u\"]\n");
+    let wanted = Accuracy::All(1e-6);
+    let Ok(found) = reached(&text, &wanted) else { panic!("refused") };
+    let meshes = found.meshes.as_ref().expect("both meshes");
+    let placed = meshes.placed.as_ref().expect("a placed mesh");
+    assert!(meshes.is_placed && found.reached && meshes.predicted < 0.8, "{}", meshes.predicted);
+    assert!(4 * placed.elements < 3 * meshes.equal.elements, "{} of {}", placed.elements, meshes.equal.elements);
+    assert!(found.settings()[0].starts_with("beam.0.elements=[[0."), "{:?}", found.settings());
+    assert!(found.settings().iter().any(|setting| setting == "beam.0.numbering=40"));
+    let error = error_with(&text, &found, &Against::Finest);
+    assert!(error <= 1e-6, "{error:e}");
+}
+
+#[test]
+fn equal_elements_stay_where_placing_saves_nothing() {
+    let Ok(found) = reached(&quarter(TIP), &Accuracy::All(1e-8)) else { panic!("refused") };
+    assert!(found.meshes.is_none_or(|meshes| !meshes.is_placed && meshes.placed.is_none()));
+}
+
+#[test]
+fn studies_keep_the_shape_of_a_graded_mesh() {
+    let graded = stretched("").replace("elements = 40", "elements = [[0.01, 0.05, 0.5, 0.95, 0.99]]\norder = 3");
+    let found = costs(&graded, &Against::Finest, 2);
+    let settings: Vec<String> = found.runs.iter().flat_map(CostRun::settings).collect();
+    let has = |setting: &str| settings.iter().any(|known| known == setting);
+    assert!(has("beam.0.elements=[[0.05,0.5,0.95]]") || has("beam.0.elements=[[0.05,0.95]]"), "{settings:?}");
+    assert!(found.runs.iter().any(|run| run.error < 1e-4));
+}
+
 #[test]
 fn only_outputs_that_are_named_must_be_accurate() {
     let name = |name: &str| Spanned { value: name.to_string(), span: 3..7 };

@@ -16,6 +16,7 @@ mod dual;
 mod effects;
 mod failures;
 mod folder;
+mod graded;
 mod hostile;
 mod invariance;
 mod joints;

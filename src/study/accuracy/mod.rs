@@ -17,6 +17,7 @@
 
 mod candidates;
 mod estimate;
+mod indicator;
 mod round;
 mod search;
 
@@ -26,7 +27,7 @@ pub(super) use estimate::{divisor_in_time, divisors_in_space, left_by_newton};
 use super::StudyError;
 use super::change::Change;
 use super::cost::{Family, Mesher, Original, Pace, Patience, Pool, Sampler, StudyOptions, Variant};
-use crate::deck::{Accuracy, Deck, InterpolationWord, StageBody};
+use crate::deck::{Accuracy, Beam, Deck, InterpolationWord, StageBody};
 use crate::scene::Scene;
 use crate::study::Outcome;
 use beamsim_core::run::Failure;
@@ -64,12 +65,51 @@ pub struct Found {
     pub runs: usize,
     /// All outputs of the variant, where they were kept, so that it need not run again
     pub outcome: Option<Outcome>,
+    /// CPU seconds of its run; NaN where it was not chosen
+    pub seconds: f64,
+    /// Equal and placed elements, where both were looked at
+    pub meshes: Option<Meshes>,
+}
+
+/// Equal elements, and elements placed where the solution varies fast.
+#[derive(Clone)]
+pub struct Meshes {
+    /// The best mesh of equal elements
+    pub equal: MeshFound,
+    /// The best mesh of placed elements; `None` where none gave an estimate with less work, or none was
+    /// tried
+    pub placed: Option<MeshFound>,
+    /// The number of placed elements over that of equal ones with the same error, as predicted
+    pub predicted: f64,
+    /// True if the placed elements were taken
+    pub is_placed: bool,
+}
+
+/// A mesh that was found.
+#[derive(Clone)]
+pub struct MeshFound {
+    /// The number of elements of all beams
+    pub elements: usize,
+    /// True if all estimates are at most the wanted errors
+    pub is_reached: bool,
+    /// The output with the largest ratio of estimate to wanted error
+    pub column: String,
+    /// Its estimated error
+    pub estimate: f64,
+    /// CPU seconds of the run
+    pub seconds: f64,
 }
 
 impl Found {
     /// The settings (`KEY=VALUE`) that make the variant.
     pub fn settings(&self) -> Vec<String> {
         self.changes.iter().map(ToString::to_string).collect()
+    }
+
+    /// Its mesh, with so many elements.
+    fn mesh_found(&self, wanted: &Accuracy, elements: usize) -> MeshFound {
+        let (column, estimate) = self.worst(wanted);
+        MeshFound { elements, is_reached: self.reached, column: column.into(), estimate, seconds: self.seconds }
     }
 
     /// The output with the largest ratio of estimate to wanted error, and its estimate.
@@ -92,9 +132,14 @@ pub fn reach(
     let original = Original { text, deck };
     let pace = first_pace(deck);
     let sampler = Sampler::of_histories(deck, scene, outputs(wanted, scene)?, coarser(pace));
-    let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
-    let mut mesher =
-        Mesher { original, sampler: &sampler, interpolation: Some(InterpolationWord::Relative), keeps_places: true };
+    let own: Vec<Vec<usize>> = deck.beams.iter().map(Beam::element_counts).collect();
+    let mut mesher = Mesher {
+        original,
+        sampler: &sampler,
+        interpolation: Some(InterpolationWord::Relative),
+        keeps_places: true,
+        placement: None,
+    };
     if !mesher.makes_sense(None, &own) {
         // Supports of single rotation components need the total interpolation.
         mesher.interpolation = None;

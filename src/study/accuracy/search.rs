@@ -2,13 +2,15 @@
 
 use super::candidates::{Candidate, Estimate, Estimates};
 use super::estimate::{ErrorShare, Fall, Outputs, Pair, Source, left_by_newton};
+use super::indicator::{self, PlacedMesh};
 use super::round::{Compared, Round, Trials};
-use super::{CUBIC, Found, coarser, has_long_steps, scaled};
-use crate::deck::{Accuracy, StageBody};
+use super::{CUBIC, Found, Meshes, coarser, has_long_steps, scaled};
+use crate::deck::{Accuracy, Beam, StageBody};
 use crate::study::StudyError;
-use crate::study::cost::{Companion, Family, Mesher, Pace, Pool, Trial, Variant};
+use crate::study::cost::{Companion, Family, Mesher, Pace, Placement, Pool, Trial, Variant};
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
+use std::sync::Arc;
 
 /// The nodes of the first mesh over those of the deck.
 const FIRST_MESH: f64 = 0.5;
@@ -51,6 +53,14 @@ const LOWER_ORDER: f64 = 0.1;
 
 /// The largest number of rounds.
 const MOST_ROUNDS: usize = 24;
+/// The largest number of rounds with placed elements.
+const MOST_PLACED_ROUNDS: usize = 4;
+
+/// The smallest number of equal elements for each piece with which placing is tried.
+const LEAST_PLACED: usize = 3;
+/// The largest number of placed elements over that of equal ones with which placing is tried, as
+/// predicted.
+const WORTH_PLACING: f64 = 0.8;
 /// The largest number of nodes.
 const MOST_NODES: usize = 200_000;
 /// The largest number of steps to the end of the run.
@@ -81,6 +91,8 @@ pub struct Search<'a> {
     longest: Pace,
     in_space: KnownShares<Mesh>,
     in_time: KnownShares<Pace>,
+    /// A variant with more work is not tried.
+    most_work: f64,
 }
 
 /// A mesh: the order of its elements, and their numbers.
@@ -131,21 +143,99 @@ impl<'a> Search<'a> {
         let in_time = KnownShares::new();
         let coarse = pace == Pace::Timeless && wanted.least() >= CUBIC;
         let mesh = if coarse { COARSE_MESH } else { FIRST_MESH };
-        Self { wanted, mesher, family, newton, mesh, pace, longest: pace, in_space, in_time }
+        let most_work = f64::INFINITY;
+        Self { wanted, mesher, family, newton, mesh, pace, longest: pace, in_space, in_time, most_work }
+    }
+
+    /// Runs rounds until the wanted accuracy is reached, with equal elements (or the shape of the
+    /// deck's mesh), then with placed ones if these promise to be fewer.
+    pub fn run(&mut self, mut pool: Pool) -> Result<Found, StudyError> {
+        let found = self.rounds(&mut pool, MOST_ROUNDS)?;
+        if !found.reached || found.stopped.is_some() || pool.is_over() {
+            return Ok(found);
+        }
+        self.with_placed_elements(found, &mut pool)
+    }
+
+    /// Runs rounds with placed elements, and gives the cheaper of both variants.
+    fn with_placed_elements(&mut self, found: Found, pool: &mut Pool) -> Result<Found, StudyError> {
+        let deck = self.mesher.original.deck;
+        let elements = found.variant.elements_of_all(deck);
+        let pieces: usize = deck.beams.iter().map(Beam::pieces).sum();
+        if elements < LEAST_PLACED * pieces.max(1) {
+            return Ok(found);
+        }
+        // A search that was stopped and goes on, or has too much to store, has no outcome.
+        let strains = match found.outcome.as_ref().map(|outcome| outcome.strains.clone()) {
+            Some(strains) => Ok(strains),
+            None => pool.strains(&found.variant),
+        };
+        let strains = match strains {
+            Ok(strains) => strains,
+            Err(StudyError::Failure(stopped)) => return Ok(Found { reached: false, stopped: Some(stopped), ..found }),
+            Err(other) => return Err(other),
+        };
+        let runs = found.runs;
+        let Some(PlacedMesh { placement, ratio }) =
+            strains.as_ref().and_then(|strains| indicator::place(&strains.beams))
+        else {
+            return Ok(found);
+        };
+        let equal = found.mesh_found(self.wanted, elements);
+        let meshes = Meshes { equal, placed: None, predicted: ratio, is_placed: false };
+        if ratio > WORTH_PLACING {
+            return Ok(Found { runs, meshes: Some(meshes), ..found });
+        }
+        let work = found.variant.work_with(elements);
+        self.place(placement, &found.variant, elements as f64 * ratio, work);
+        match self.rounds(pool, MOST_PLACED_ROUNDS) {
+            Ok(placed) if placed.stopped.is_some() => {
+                Ok(Found { reached: false, stopped: placed.stopped, runs: runs + placed.runs, ..found })
+            }
+            Ok(placed) => {
+                let mesh = placed.mesh_found(self.wanted, placed.variant.count());
+                let is_placed = placed.reached && placed.variant.work() < work;
+                let runs = runs + placed.runs;
+                let meshes = Some(Meshes { placed: Some(mesh), is_placed, ..meshes });
+                Ok(if is_placed { Found { runs, meshes, ..placed } } else { Found { runs, meshes, ..found } })
+            }
+            Err(StudyError::Failure(stopped @ Failure::Interrupted { .. })) => {
+                Ok(Found { reached: false, stopped: Some(stopped), runs, ..found })
+            }
+            // No placed mesh gave an estimate.
+            Err(_) => Ok(Found { runs, meshes: Some(meshes), ..found }),
+        }
+    }
+
+    /// Goes on with placed elements, about so many in the whole scene.
+    fn place(&mut self, placement: Placement, variant: &Variant, elements: f64, most_work: f64) {
+        self.mesher.placement = Some(Arc::new(placement));
+        let order = self.family.order;
+        let one = self.mesher.original.deck.beams.iter().map(|beam| {
+            let ratio = beam.order as f64 / order.unwrap_or(beam.order) as f64;
+            ratio * (0..beam.pieces()).map(|piece| beam.elements_of(piece).count()).sum::<usize>() as f64
+        });
+        self.mesh = elements / one.sum::<f64>();
+        self.pace = variant.pace;
+        self.in_space = KnownShares::new();
+        self.most_work = most_work;
     }
 
     /// Runs rounds until the wanted accuracy is reached.
-    pub fn run(&mut self, mut pool: Pool) -> Result<Found, StudyError> {
+    fn rounds(&mut self, pool: &mut Pool, most: usize) -> Result<Found, StudyError> {
         let mut best: Option<Found> = None;
         let mut runs = 0;
         let mut ended = String::from(" within the budget");
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..most {
             let mut round = self.round();
             if self.is_too_large(&round.own) {
                 ended = format!(" with fewer than {MOST_NODES} nodes and {MOST_STEPS:e} steps");
                 break;
             }
-            let trials = match (round.run(&mut pool), best.take()) {
+            if round.own.work() >= self.most_work {
+                break;
+            }
+            let trials = match (round.run(pool), best.take()) {
                 (Err(StudyError::Failure(stopped)), Some(found)) => {
                     return Ok(Found { runs, stopped: Some(stopped), ..found });
                 }
@@ -157,7 +247,7 @@ impl<'a> Search<'a> {
             let Some(trials) = trials else { break };
             runs += trials.runs;
             ended = format!("; the last of {runs} runs ended with `{}`", trials.own.status);
-            match self.after_own_run(&round, &trials.own, best.is_none(), &pool)? {
+            match self.after_own_run(&round, &trials.own, best.is_none(), pool)? {
                 Next::Estimates => {}
                 Next::Another => continue,
                 Next::Nothing => break,
@@ -167,7 +257,7 @@ impl<'a> Search<'a> {
                 self.longest = scaled(self.pace, 0.5);
             }
             let estimates = self.estimates(&round, &trials);
-            let chosen = self.choose(estimates.accurate_enough(&round), &mut pool, &mut runs);
+            let chosen = self.choose(estimates.accurate_enough(&round), pool, &mut runs);
             let found = self.found(round.own, &estimates.own, runs);
             match chosen {
                 Err(StudyError::Failure(stopped)) => {
@@ -241,7 +331,8 @@ impl<'a> Search<'a> {
                 }
             }
             let outcome = pool.take_outcome(&variant);
-            return Ok(Some(Found { outcome, ..self.found(variant, &estimate, *runs) }));
+            let seconds = pool.seconds(&variant);
+            return Ok(Some(Found { outcome, seconds, ..self.found(variant, &estimate, *runs) }));
         }
         Ok(None)
     }
@@ -262,6 +353,7 @@ impl<'a> Search<'a> {
         let order = self.family.order;
         let variant = |elements: &Vec<Vec<usize>>, pace| Variant {
             newton: self.newton,
+            placement: self.mesher.placement.clone(),
             ..Variant::new(self.family.clone(), elements.clone(), pace)
         };
         let own = variant(&self.mesher.elements(order, self.mesh), self.pace);
@@ -358,6 +450,8 @@ impl<'a> Search<'a> {
             runs,
             variant,
             outcome: None,
+            seconds: f64::NAN,
+            meshes: None,
         }
     }
 

@@ -1,10 +1,12 @@
 //! Meshes on which a deck can run: every load, support and output finds its node.
 
+use super::placement::Placement;
 use super::places::Piece;
 use super::sample::Sampler;
 use super::trial;
 use super::variant::{Family, Original, Pace, Variant};
 use crate::deck::{Beam, InterpolationWord};
+use std::sync::Arc;
 
 /// The largest divisor of the deck's numbers of elements that is tried for a coarser mesh, and the
 /// number of multiples for a finer one.
@@ -28,6 +30,8 @@ pub struct Mesher<'a> {
     pub interpolation: Option<InterpolationWord>,
     /// True if outputs at nodes of the deck's mesh must be at nodes of other meshes, too
     pub keeps_places: bool,
+    /// The places of the elements; `None` for the shape of the deck's mesh
+    pub placement: Option<Arc<Placement>>,
 }
 
 impl Mesher<'_> {
@@ -36,8 +40,13 @@ impl Mesher<'_> {
     /// taken instead.
     pub fn elements(&self, order: Option<usize>, factor: f64) -> Vec<Vec<usize>> {
         let ratio = |beam: &Beam| (beam.order as f64 / order.unwrap_or(beam.order) as f64) * factor;
+        if let Some(placement) = &self.placement {
+            let of_beam = |beam: &Beam| ratio(beam) * element_count(beam) as f64;
+            return placement.counts(self.original.deck.beams.iter().map(of_beam).sum());
+        }
         let each = |count: &dyn Fn(&Beam, usize) -> usize| -> Vec<Vec<usize>> {
-            let of_beam = |beam: &Beam| beam.elements.value.iter().map(|&n| count(beam, n)).collect();
+            let of_beam =
+                |beam: &Beam| beam.elements.value.iter().map(|division| count(beam, division.count())).collect();
             self.original.deck.beams.iter().map(of_beam).collect()
         };
         let rounded = each(&|beam, n| (n as f64 * ratio(beam)).round().max(1.0) as usize);
@@ -46,7 +55,9 @@ impl Mesher<'_> {
             return rounded;
         }
         let parts = (2..=MOST_PARTS).rev().filter(|q| {
-            let whole = |beam: &Beam| *q as f64 * ratio(beam) <= 1.0 && beam.elements.value.iter().all(|n| n % q == 0);
+            let whole = |beam: &Beam| {
+                *q as f64 * ratio(beam) <= 1.0 && beam.elements.value.iter().all(|division| division.count() % q == 0)
+            };
             self.original.deck.beams.iter().all(whole)
         });
         let parts = parts.map(|q| each(&|_, n| n / q));
@@ -83,7 +94,9 @@ impl Mesher<'_> {
         let orders = self.orders(order);
         let of_piece = |beam: usize, piece: usize, count: usize| {
             let Sampler { places, outputs, .. } = self.sampler;
-            let unit = if self.keeps_places {
+            let unit = if let Some(placement) = &self.placement {
+                placement.unit(beam, piece)
+            } else if self.keeps_places {
                 places.unit(Piece { beam, number: piece }, orders[beam], outputs, 2 * count)
             } else {
                 1
@@ -103,13 +116,21 @@ impl Mesher<'_> {
 
     /// For each column: true if it lies between nodes of a mesh.
     pub fn between(&self, order: Option<usize>, elements: &[Vec<usize>]) -> Vec<bool> {
-        self.sampler.places.between(elements, &self.orders(order))
+        // Placed elements have other inner nodes than equal ones.
+        let orders = if self.placement.is_some() { self.orders(Some(1)) } else { self.orders(order) };
+        self.sampler.places.between(elements, &orders)
     }
 
     /// True if the deck can run with these elements of an order.
     pub fn makes_sense(&self, order: Option<usize>, elements: &[Vec<usize>]) -> bool {
         let family = Family { order, interpolation: self.interpolation, ..Family::default() };
-        let variant = Variant::new(family, elements.to_vec(), Pace::Timeless);
+        let placement = self.placement.clone();
+        let variant = Variant { placement, ..Variant::new(family, elements.to_vec(), Pace::Timeless) };
         trial::makes_sense(self.original, &variant, self.sampler)
     }
+}
+
+/// The number of elements of a beam in the deck.
+fn element_count(beam: &Beam) -> usize {
+    (0..beam.pieces()).map(|piece| beam.elements_of(piece).count()).sum()
 }

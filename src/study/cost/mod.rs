@@ -8,6 +8,7 @@ mod journal;
 mod limits;
 mod mesher;
 mod order;
+mod placement;
 mod places;
 mod pool;
 mod reference;
@@ -25,6 +26,7 @@ pub use trial::{Patience, Seconds, Trial};
 pub use variant::{Family, Pace, Variant};
 
 pub(in crate::study) use mesher::{Companion, Mesher};
+pub(in crate::study) use placement::{PlacedPiece, Placement};
 pub(in crate::study) use pool::Pool;
 pub(in crate::study) use sample::{Sampler, Samples};
 pub(in crate::study) use variant::{Original, dynamic_stages};
@@ -94,7 +96,7 @@ pub fn study(
     let (sampler, given) = sampler(deck, scene, &grid, against)?;
     let mut pool = Pool::new(original, &sampler, options);
 
-    let mesher = Mesher { original, sampler: &sampler, interpolation: None, keeps_places: false };
+    let mesher = Mesher { original, sampler: &sampler, interpolation: None, keeps_places: false, placement: None };
     let variants = grid.variants(&mesher);
     pool.expect(variants.len());
     let reference = match given {

@@ -37,24 +37,31 @@ impl Places {
         let counts = |k: &usize| outputs.is_empty() || outputs.contains(k);
         let here = |spot: &&Spot| spot.is_node && spot.beam == piece.beam && spot.piece == piece.number;
         let all = || self.0.iter().enumerate().filter(|(k, _)| counts(k)).filter_map(|(_, spot)| spot.as_ref());
-        let kept: Vec<f64> = all().filter(here).map(|spot| spot.along).collect();
-        (1..=most).find(|&count| kept.iter().all(|&along| is_node(along, count * order))).unwrap_or(1)
+        let kept: Vec<&Spot> = all().filter(here).collect();
+        (1..=most).find(|&count| kept.iter().all(|spot| is_node(spot, count, order))).unwrap_or(1)
     }
 
     /// For each column: true if it lies between nodes of a mesh whose beams have these orders.
     pub fn between(&self, elements: &[Vec<usize>], orders: &[usize]) -> Vec<bool> {
         let lies_between = |spot: &Spot| {
             let count = elements.get(spot.beam).and_then(|pieces| pieces.get(spot.piece));
-            count.zip(orders.get(spot.beam)).is_some_and(|(count, order)| !is_node(spot.along, count * order))
+            count.zip(orders.get(spot.beam)).is_some_and(|(&count, &order)| !is_node(spot, count, order))
         };
         self.0.iter().map(|spot| spot.as_ref().is_some_and(lies_between)).collect()
     }
 }
 
-/// True if a piece of `parts` equal parts has a node at the fraction `along`.
-fn is_node(along: f64, parts: usize) -> bool {
-    let x = along * parts as f64;
-    (x - x.round()).abs() < AT_NODE
+/// True if there is a node at a position when its piece has so many elements of an order. Elements
+/// of different lengths have inner nodes in common only if one lies within the other.
+fn is_node(spot: &Spot, count: usize, order: usize) -> bool {
+    let is_end_of_one = |parts: usize| {
+        let x = spot.along * parts as f64;
+        (x - x.round()).abs() < AT_NODE
+    };
+    match spot.graded {
+        Some(own) if count % own != 0 => is_end_of_one(count),
+        Some(_) | None => is_end_of_one(count * order),
+    }
 }
 
 #[cfg(test)]
@@ -63,7 +70,7 @@ mod tests {
 
     #[test]
     fn nodes_of_a_mesh_stay_nodes_of_its_multiples() {
-        let spot = |along, is_node| Some(Spot { beam: 0, piece: 1, along, is_node });
+        let spot = |along, is_node| Some(Spot { beam: 0, piece: 1, along, is_node, graded: None });
         let places = Places(vec![None, spot(0.5, true), spot(1.0 / 3.0, true), spot(0.37, false)]);
         let unit = |order, outputs: &[usize], most| places.unit(Piece { beam: 0, number: 1 }, order, outputs, most);
         assert_eq!((unit(1, &[], 10), unit(2, &[], 10), unit(3, &[], 10)), (6, 3, 2));
@@ -73,5 +80,14 @@ mod tests {
         );
         assert_eq!(places.between(&[vec![1, 4]], &[3]), [false, false, false, true]);
         assert_eq!(places.between(&[vec![1, 3]], &[1]), [false, true, false, true]);
+    }
+
+    #[test]
+    fn inner_nodes_of_graded_elements_stay_only_within_divided_elements() {
+        let spot = |along| Spot { beam: 0, piece: 0, along, is_node: true, graded: Some(4) };
+        let end = spot(0.5);
+        let inner = spot(0.375);
+        assert!(is_node(&end, 2, 1) && is_node(&end, 4, 2) && !is_node(&end, 3, 1));
+        assert!(is_node(&inner, 4, 2) && is_node(&inner, 8, 1) && !is_node(&inner, 2, 4));
     }
 }

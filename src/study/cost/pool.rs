@@ -9,6 +9,7 @@ use crate::study::StudyError;
 use crate::study::change::Change;
 use crate::study::outcome::Outcome;
 use crate::study::parallel::in_parallel;
+use crate::study::strains::StrainRecord;
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::{Failure, Moment};
 use std::collections::HashMap;
@@ -77,7 +78,7 @@ impl<'a, 'o> Pool<'a, 'o> {
         Self { patience, ..self }
     }
 
-    /// Keeps all outputs of the last runs.
+    /// Keeps all outputs of the last runs, with strains along beams.
     pub fn with_outcomes(self) -> Self {
         Self { outcomes: Some(HashMap::new()), ..self }
     }
@@ -92,6 +93,28 @@ impl<'a, 'o> Pool<'a, 'o> {
     pub fn take_outcome(&mut self, variant: &Variant) -> Option<Outcome> {
         let key = self.key(variant);
         self.outcomes.as_mut()?.remove(&key)
+    }
+
+    /// CPU seconds of a variant that has run; NaN for others.
+    pub fn seconds(&self, variant: &Variant) -> f64 {
+        self.options.journal.find(&self.key(variant)).map_or(f64::NAN, |trial| trial.seconds.cpu)
+    }
+
+    /// Strains of a variant, from another run of it; `None` where it does not finish.
+    pub fn strains(&self, variant: &Variant) -> Result<Option<StrainRecord>, StudyError> {
+        let changes = variant.changes(self.original);
+        let signals = self.options.interrupted;
+        let (_, outcome) =
+            trial::run(self.original.deck, &changes, self.sampler, (self.patience)(variant), true, &signals);
+        match signals() {
+            Some(signal) => Err(StudyError::Failure(interrupted(signal))),
+            None => Ok(outcome.filter(|outcome| outcome.ended.is_ok()).and_then(|outcome| outcome.strains)),
+        }
+    }
+
+    /// True if no run starts any more.
+    pub fn is_over(&self) -> bool {
+        self.deadline.is_over()
     }
 
     fn key(&self, variant: &Variant) -> String {
@@ -130,7 +153,7 @@ impl<'a, 'o> Pool<'a, 'o> {
         let stopped = || signals().or_else(|| deadline.is_over().then_some(0));
         let keeps = self.outcomes.is_some();
         let run = |k: usize| {
-            let (trial, outcome) = trial::run(deck, &changes[k], sampler, patience(&variants[k]), &stopped);
+            let (trial, outcome) = trial::run(deck, &changes[k], sampler, patience(&variants[k]), keeps, &stopped);
             let outcome = outcome.filter(|outcome| keeps && trial.finished() && outcome.size() < KEPT_NUMBERS);
             (!trial.failed_as(FailureKind::Interrupted)).then_some((trial, outcome))
         };
@@ -182,7 +205,7 @@ impl<'a, 'o> Pool<'a, 'o> {
                     continue;
                 }
                 let (trial, _) =
-                    trial::run(deck, &runs[k].changes, self.sampler, Patience::LONG, &self.options.interrupted);
+                    trial::run(deck, &runs[k].changes, self.sampler, Patience::LONG, false, &self.options.interrupted);
                 if let Some(signal) = (self.options.interrupted)() {
                     return Err(StudyError::Failure(interrupted(signal)));
                 }

@@ -7,6 +7,7 @@ use crate::study::StudyError;
 use crate::study::built::BuiltDeck;
 use crate::study::change::Change;
 use crate::study::outcome::Outcome;
+use crate::study::strains::StrainRecord;
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 use cpu_time::ThreadTime;
@@ -77,18 +78,20 @@ impl Trial {
     }
 }
 
-/// Runs a deck with changes. Gives the trial, and all outputs where there is such a scene.
+/// Runs a deck with changes. Gives the trial, and all outputs where there is such a scene, also with
+/// `strains` along its beams if these are wanted.
 /// `interrupted` gives the signal that was caught.
 pub fn run(
     deck: &Deck,
     changes: &[Change],
     sampler: &Sampler,
     patience: Patience,
+    strains: bool,
     interrupted: &dyn Fn() -> Option<i32>,
 ) -> (Trial, Option<Outcome>) {
     let cpu = ThreadTime::try_now().ok();
     let wall = Instant::now();
-    let outcome = simulate(deck, changes, sampler, patience, interrupted);
+    let outcome = simulate_with(deck, changes, sampler, patience, strains, interrupted);
     let wall = wall.elapsed().as_secs_f64();
     // Systems without CPU times of threads have the wall-clock time instead.
     let cpu = cpu.and_then(|start| start.try_elapsed().ok()).map_or(wall, |time| time.as_secs_f64());
@@ -123,8 +126,21 @@ pub fn simulate(
     patience: Patience,
     interrupted: &dyn Fn() -> Option<i32>,
 ) -> Result<Outcome, StudyError> {
-    let BuiltDeck { deck, scene } = build(deck, changes, sampler)?;
-    Ok(Outcome::of(&scene, sampler.recorder(&scene), attempts(&deck, patience), interrupted))
+    simulate_with(deck, changes, sampler, patience, false, interrupted)
+}
+
+fn simulate_with(
+    deck: &Deck,
+    changes: &[Change],
+    sampler: &Sampler,
+    patience: Patience,
+    strains: bool,
+    interrupted: &dyn Fn() -> Option<i32>,
+) -> Result<Outcome, StudyError> {
+    let built = build(deck, changes, sampler)?;
+    let strains = if strains { StrainRecord::of(&built) } else { None };
+    let BuiltDeck { deck, scene } = &built;
+    Ok(Outcome::with_strains(scene, sampler.recorder(scene), strains, attempts(deck, patience), interrupted))
 }
 
 fn build(deck: &Deck, changes: &[Change], sampler: &Sampler) -> Result<BuiltDeck, StudyError> {

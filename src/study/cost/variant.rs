@@ -1,8 +1,10 @@
 //! Variants of a deck: other elements, orders, interpolations, schemes, steps and tolerances.
 
 use super::order::Expected;
-use crate::deck::{Beam, Deck, InterpolationWord, SchemeName, SchemeWord, StageBody, Words};
+use super::placement::Placement;
+use crate::deck::{Beam, Deck, Division, InterpolationWord, SchemeName, SchemeWord, StageBody, Words};
 use crate::study::change::Change;
+use std::sync::Arc;
 
 /// A deck that a study varies.
 #[derive(Clone, Copy)]
@@ -50,6 +52,9 @@ pub struct Variant {
     pub family: Family,
     /// Elements of each piece of each beam
     pub elements: Vec<Vec<usize>>,
+    /// The places of their ends; `None` where the shape of the deck's mesh is kept. Then each piece
+    /// has its own number of elements.
+    pub placement: Option<Arc<Placement>>,
     /// The time steps
     pub pace: Pace,
     /// Factor of the tolerances of Newton's method
@@ -82,7 +87,16 @@ pub(in crate::study) fn dynamic_stages(deck: &Deck) -> impl Iterator<Item = (usi
 impl Variant {
     /// A variant with the deck's tolerances of Newton's method.
     pub fn new(family: Family, elements: Vec<Vec<usize>>, pace: Pace) -> Self {
-        Self { family, elements, pace, newton: 1.0 }
+        Self { family, elements, placement: None, pace, newton: 1.0 }
+    }
+
+    /// The number of elements of all beams, with all their pieces.
+    pub fn elements_of_all(&self, deck: &Deck) -> usize {
+        let of_beam = |(beam, counts): (&Beam, &Vec<usize>)| match counts[..] {
+            [each] => each * beam.pieces(),
+            _ => counts.iter().sum(),
+        };
+        deck.beams.iter().zip(&self.elements).map(of_beam).sum()
     }
 
     /// The number of elements of all beams; a beam whose pieces share one number counts once.
@@ -105,13 +119,18 @@ impl Variant {
 
     /// An estimate of the work, to compare variants of one deck.
     pub fn work(&self) -> f64 {
+        self.work_with(self.count())
+    }
+
+    /// The work if all pieces of all beams together have so many elements.
+    pub fn work_with(&self, elements: usize) -> f64 {
         let order = self.family.order.unwrap_or(1) as f64;
         let paces = match self.pace {
             Pace::Timeless => 1.0,
             Pace::Steps(factor) => 1.0 / factor,
             Pace::Adapts(tolerance) => tolerance.powf(-1.0 / 3.0),
         };
-        (4.0 + self.count() as f64 * order * order) * paces
+        (4.0 + elements as f64 * order * order) * paces
     }
 
     /// The changes that make this variant of a deck; none where it is the deck itself.
@@ -136,8 +155,13 @@ impl Variant {
         let order = self.family.order.unwrap_or(beam.order);
         let interpolation = self.family.interpolation.unwrap_or(beam.interpolation);
         let mut changes = Vec::new();
-        if elements != beam.elements.value {
-            changes.push(Change::Elements { beam: k, counts: elements.to_vec() });
+        let own = &beam.elements.value;
+        let divisions: Vec<Division> = match &self.placement {
+            Some(placement) => (0..).zip(elements).map(|(p, &count)| placement.division(k, p, count)).collect(),
+            None => own.iter().zip(elements).map(|(division, &count)| division.with_count(count)).collect(),
+        };
+        if divisions != *own {
+            changes.push(Change::Elements { beam: k, divisions });
         }
         if order != beam.order {
             changes.push(Change::Order { beam: k, order });
@@ -148,7 +172,7 @@ impl Variant {
         }
         // Node numbers keep the places that they have on the mesh of the deck.
         if has_other_nodes && beam.numbering.is_none() && original.names_nodes_of(beam) {
-            let parts = beam.elements.value.iter().map(|count| count * beam.order).collect();
+            let parts = beam.elements.value.iter().map(|division| division.steps(beam.order)).collect();
             changes.push(Change::Numbering { beam: k, parts });
         }
         changes
