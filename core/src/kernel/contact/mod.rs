@@ -1,0 +1,24 @@
+//! Contact with friction of beams and bodies against rigid surfaces, and of pairs of beams.
+//!
+//! Sections are round with a radius r for contact, whatever their stiffness. A contact adds f =
+//! dW/dq, in the sign of internal forces (g = f_int + f_acc - f_ext), and K = df/dq.
+//!
+//! Order of reading: [`surface`] and [`tube`] (distance, normal and curvature of rigid surfaces),
+//! [`law`] (normal force of a gap), [`friction`] (traction by return mapping), [`point`] (forces
+//! and tangent of one contact point), [`along`] (closest points that move along an element).
+//!
+//! Kernels here run one point at a time, not on lanes: branches may follow values.
+
+pub mod cone;
+pub mod distance;
+pub mod minimum;
+pub mod surface;
+pub mod tube;
+
+#[cfg(test)]
+mod dual;
+
+pub use cone::Cone;
+pub use distance::{Distance, Feature, Undefined};
+pub use surface::{Shape, Side, Surface};
+pub use tube::{Tube, TubeEnds, TubeError};
