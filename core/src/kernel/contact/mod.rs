@@ -9,16 +9,26 @@
 //!
 //! Kernels here run one point at a time, not on lanes: branches may follow values.
 
+pub mod along;
 pub mod cone;
 pub mod distance;
+pub mod friction;
+pub mod law;
 pub mod minimum;
+pub mod point;
 pub mod surface;
 pub mod tube;
 
 #[cfg(test)]
 mod dual;
+#[cfg(test)]
+mod tests;
 
+pub use along::{MAX_MINIMA, Minima, Minimum, ShapeAt};
 pub use cone::Cone;
 pub use distance::{Distance, Feature, Undefined};
+pub use friction::{CarriedTraction, FrictionLaw, Status, Traction};
+pub use law::{NormalForce, NormalLaw};
+pub use point::{Carrier, ContactLaw, ContactNode, NodeBefore, Place, PointState, add_point};
 pub use surface::{Shape, Side, Surface};
 pub use tube::{Tube, TubeEnds, TubeError};
