@@ -10,14 +10,18 @@
 //! Kernels here run one point at a time, not on lanes: branches may follow values.
 
 pub mod along;
+pub mod beam_pair;
 pub mod cone;
 pub mod distance;
 pub mod friction;
+pub mod grid;
 pub mod law;
 pub mod minimum;
+pub mod pair_search;
 pub mod point;
 pub mod surface;
 pub mod tube;
+pub mod variation;
 
 #[cfg(test)]
 mod dual;
@@ -25,10 +29,12 @@ mod dual;
 mod tests;
 
 pub use along::{MAX_MINIMA, Minima, Minimum, ShapeAt};
+pub use beam_pair::{PairLaw, PairSide, add_pair};
 pub use cone::Cone;
 pub use distance::{Distance, Feature, Undefined};
 pub use friction::{CarriedTraction, FrictionLaw, Status, Traction};
 pub use law::{NormalForce, NormalLaw};
-pub use point::{Carrier, ContactLaw, ContactNode, NodeBefore, Place, PointState, add_point};
+pub use point::{Carrier, ContactLaw, Place, PointState, add_point};
 pub use surface::{Shape, Side, Surface};
 pub use tube::{Tube, TubeEnds, TubeError};
+pub use variation::{ContactNode, NodeBefore};

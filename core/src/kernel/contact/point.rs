@@ -55,32 +55,11 @@ use super::along::{ShapeAt, weighted_sum};
 use super::distance::Distance;
 use super::friction::{CarriedTraction, FrictionLaw, Status, Traction};
 use super::law::{NormalForce, NormalLaw};
+use super::variation::{Change, Column, ContactNode, Derived, Turned};
 use crate::kernel::element::{ElementSystem, Weights};
-use crate::rotation::{Rotation, log};
+use crate::rotation::Rotation;
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
-
-/// A node as the carrier of the surface saw it at the last converged state.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NodeBefore {
-    /// y0 = Q0^T (x0 - c0)
-    pub place: Vec3,
-    /// S0 = Q0^T R0
-    pub rotation: Mat3,
-}
-
-/// A node of an element in contact.
-#[derive(Clone, Copy, Debug)]
-pub struct ContactNode<T = f64> {
-    /// x, its place, spatial
-    pub place: Vec3<T>,
-    /// dx/dt; zero in statics
-    pub velocity: Vec3<T>,
-    /// Its rotation, with the tensor T of the unknown
-    pub rotation: Rotation<T>,
-    /// The node at the last converged state; only friction needs it
-    pub before: NodeBefore,
-}
 
 /// The carrier of a surface.
 #[derive(Clone, Copy, Debug)]
@@ -170,6 +149,11 @@ impl<T: Real> PointState<T> {
     pub fn status(&self) -> Status {
         if self.normal_force.force.largest() <= 0.0 { Status::Open } else { self.traction.status }
     }
+
+    /// F = p n + t, the force on the element, in the axes of the carrier.
+    pub fn force(&self) -> Vec3<T> {
+        self.normal * self.normal_force.force + self.traction.force
+    }
 }
 
 /// The motion of a point as its carrier sees it.
@@ -182,58 +166,6 @@ struct Seen<T> {
     velocity: Vec3<T>,
     /// dy/dt
     rate: Vec3<T>,
-}
-
-/// Rotations of the nodes as the carrier sees them, for friction.
-struct Turned<const N: usize, T> {
-    /// S_i
-    rotations: [Mat3<T>; N],
-    /// theta_i
-    angles: [Vec3<T>; N],
-    /// T(theta_i)^-T
-    maps: [Mat3<T>; N],
-    /// theta
-    angle: Vec3<T>,
-}
-
-/// A force or moment with its derivatives: over y at constant p, theta, y0 and p.
-struct Derived<T> {
-    value: Vec3<T>,
-    over_place: Mat3<T>,
-    over_angle: Mat3<T>,
-    over_before: Mat3<T>,
-    over_pressure: Vec3<T>,
-}
-
-/// Changes of what forces depend on, by a change of one scalar.
-struct Change<T> {
-    place: Vec3<T>,
-    angle: Vec3<T>,
-    before: Vec3<T>,
-    pressure: T,
-}
-
-/// The derivatives over a block of three unknowns, weighted, of what forces depend on.
-struct Column<T> {
-    /// dy
-    place: Mat3<T>,
-    /// dtheta
-    angle: Mat3<T>,
-    /// dp, a row
-    pressure: Vec3<T>,
-}
-
-impl<T: Real> Derived<T> {
-    fn by(&self, change: &Change<T>) -> Vec3<T> {
-        self.over_place * change.place
-            + self.over_angle * change.angle
-            + self.over_before * change.before
-            + self.over_pressure * change.pressure
-    }
-
-    fn over(&self, column: &Column<T>) -> Mat3<T> {
-        self.over_place * column.place + self.over_angle * column.angle + self.over_pressure.outer(column.pressure)
-    }
 }
 
 /// Adds the forces of a contact point to `out`, and the tangent of the weights: blocks x_1, P_1, …,
@@ -255,7 +187,7 @@ pub fn add_point<const N: usize, T: Real>(
     if state.status() == Status::Open {
         return state;
     }
-    let turned = law.friction.map(|_| Turned::new(nodes, shape, carrier));
+    let turned = law.friction.map(|_| Turned::new(nodes, shape, &carrier.rotation.r));
     let before = weighted_sum(&shape.values, |i| Vec3::constant(nodes[i].before.place));
     if let (Some(friction), Some(turned)) = (&law.friction, &turned) {
         let rolled = turned.angle.cross(distance.normal).scale(law.radius);
@@ -274,26 +206,6 @@ impl<T: Real> Seen<T> {
         let tangent = q.transpose_mul(weighted_sum(&shape.slopes, |i| nodes[i].place));
         let velocity = q.transpose_mul(weighted_sum(&shape.values, |i| nodes[i].velocity) - carrier.velocity);
         Self { place, tangent, velocity, rate: velocity + place.cross(carrier.omega) }
-    }
-}
-
-impl<const N: usize, T: Real> Turned<N, T> {
-    fn new(nodes: &[ContactNode<T>; N], shape: &ShapeAt<N, T>, carrier: &Carrier<T>) -> Self {
-        let mut out = Self {
-            rotations: [Mat3::zero(); N],
-            angles: [Vec3::zero(); N],
-            maps: [Mat3::zero(); N],
-            angle: Vec3::zero(),
-        };
-        for i in 0..N {
-            let rotation = carrier.rotation.r.transpose_matmul(nodes[i].rotation.r);
-            let angle = log(rotation * Mat3::constant(nodes[i].before.rotation).transpose());
-            out.rotations[i] = rotation;
-            out.angles[i] = angle;
-            out.maps[i] = Rotation::new(angle).t_inverse().transpose();
-            out.angle += angle * shape.values[i];
-        }
-        out
     }
 }
 
@@ -366,7 +278,7 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
             value: n.cross(friction.value),
             over_place: Mat3::skew_mul(n, friction.over_place)
                 - Mat3::skew_mul(friction.value, self.distance.curvature),
-            over_angle: Mat3::skew_mul(n, friction.over_angle),
+            over_rolling: Mat3::skew_mul(n, friction.over_rolling),
             over_before: Mat3::skew_mul(n, friction.over_before),
             over_pressure: n.cross(friction.over_pressure),
         }
@@ -383,7 +295,7 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         Derived {
             value: t.force,
             over_place: t.over_sliding * slides + t.over_normal * curvature,
-            over_angle: t.over_sliding * n.skew().scale(r),
+            over_rolling: t.over_sliding * n.skew(),
             over_before: -t.over_sliding,
             over_pressure: t.over_pressure,
         }
@@ -425,15 +337,15 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let moved = self.carrier.rotation.r.transpose() * factor;
         let by_rate = self.distance.normal * self.state.normal_force.over_rate;
         let pressure = self.pressure_over_place().scale(weights.stiffness) + by_rate.scale(weights.damping);
-        Column { place: moved.scale(weights.stiffness), angle: Mat3::zero(), pressure: moved.transpose() * pressure }
+        Column { place: moved.scale(weights.stiffness), rolling: Mat3::zero(), pressure: moved.transpose() * pressure }
     }
 
     /// The column of the rotation of node `i`; `None` without friction.
     fn node_rotation(&self, i: usize, weights: Weights) -> Option<Column<T>> {
         let turned = self.turned.as_ref()?;
         let spun = turned.maps[i] * (turned.rotations[i] * self.nodes[i].rotation.t);
-        let angle = spun * (self.shape.values[i] * weights.stiffness);
-        Some(Column { place: Mat3::zero(), angle, pressure: Vec3::zero() })
+        let rolling = spun * (self.shape.values[i] * (weights.stiffness * self.law.radius));
+        Some(Column { place: Mat3::zero(), rolling, pressure: Vec3::zero() })
     }
 
     /// The column of the rotation of the carrier.
@@ -441,16 +353,16 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let n = self.distance.normal;
         let t = self.carrier.rotation.t.scale(weights.stiffness);
         let place = Mat3::skew_mul(self.seen.place, t);
-        let mut angle = Mat3::zero();
+        let mut rolling = Mat3::zero();
         if let Some(turned) = &self.turned {
             for i in 0..N {
-                angle -= turned.maps[i] * t * self.shape.values[i];
+                rolling -= turned.maps[i] * t * (self.shape.values[i] * self.law.radius);
             }
         }
         let by_spin = t.transpose_mul(n.cross(self.seen.velocity))
             + self.carrier.omega_derivative.transpose_mul(n.cross(self.seen.place));
         let pressure = place.transpose_mul(self.pressure_over_place()) + by_spin * self.state.normal_force.over_rate;
-        Column { place, angle, pressure }
+        Column { place, rolling, pressure }
     }
 
     fn add_column(
@@ -571,7 +483,8 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let faster = self.distance.normal.dot(self.carrier.rotation.r.transpose_mul(velocity));
         Change {
             place: self.seen.tangent,
-            angle: weighted_sum(slopes, |i| turned.map_or(Vec3::zero(), |turned| turned.angles[i])),
+            rolling: weighted_sum(slopes, |i| turned.map_or(Vec3::zero(), |turned| turned.angles[i]))
+                .scale(self.law.radius),
             before: weighted_sum(slopes, |i| Vec3::constant(self.nodes[i].before.place)),
             pressure: self.pressure_over_place().dot(self.seen.tangent) + faster * self.state.normal_force.over_rate,
         }
