@@ -47,6 +47,7 @@ impl<const N: usize> Neg for Dual<N> {
 
 impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
+    #[allow(clippy::suspicious_arithmetic_impl)]
     fn mul(self, b: Self) -> Self {
         let partial = |k: usize| self.partials[k] * b.value + self.value * b.partials[k];
         Self { value: self.value * b.value, partials: from_fn(partial) }

@@ -182,12 +182,12 @@ impl Tube {
     pub(super) fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
         let here = Vec3(y.0.map(T::largest));
         match &self.line {
-            CentreLine::Straight(cones) => self.from_cones(cones, y, here),
-            CentreLine::Smooth(pieces) => self.from_spline(pieces, y, here),
+            CentreLine::Straight(cones) => self.distance_from_cones(cones, y, here),
+            CentreLine::Smooth(pieces) => self.distance_from_spline(pieces, y, here),
         }
     }
 
-    fn from_cones<T: Real>(&self, cones: &[Cone], y: Vec3<T>, here: Vec3) -> Result<Distance<T>, Undefined> {
+    fn distance_from_cones<T: Real>(&self, cones: &[Cone], y: Vec3<T>, here: Vec3) -> Result<Distance<T>, Undefined> {
         let mut best: Option<(usize, f64)> = None;
         for (k, cone) in cones.iter().enumerate() {
             if best.is_some_and(|(_, value)| cone.lower_bound(here) >= value) {
@@ -208,7 +208,12 @@ impl Tube {
         }
     }
 
-    fn from_spline<T: Real>(&self, pieces: &[Piece], y: Vec3<T>, here: Vec3) -> Result<Distance<T>, Undefined> {
+    fn distance_from_spline<T: Real>(
+        &self,
+        pieces: &[Piece],
+        y: Vec3<T>,
+        here: Vec3,
+    ) -> Result<Distance<T>, Undefined> {
         let mut best: Option<(usize, Closest)> = None;
         for (k, piece) in pieces.iter().enumerate() {
             if best.is_some_and(|(_, closest)| piece.lower_bound(here) >= closest.value) {
