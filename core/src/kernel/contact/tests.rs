@@ -1,6 +1,6 @@
 //! Contact points against dual numbers, balance of forces and moments, objectivity, symmetry.
 
-use super::along::{ShapeAt, minima, slopes, weighted_sum};
+use super::along::{MinimumKind, ShapeAt, minima, slopes, weighted_sum};
 use super::dual::{Dual, Random, along, tangent_error};
 use super::friction::{CarriedTraction, FrictionLaw, Status};
 use super::law::NormalLaw;
@@ -256,7 +256,7 @@ fn random_scene<const N: usize>(random: &mut Random, surface: &Surface, kind: Ki
     let distance = |y: Vec3| surface.distance(y).ok();
     let seen = scene.seen();
     if kind.place == Place::Closest {
-        scene.s = minima(&seen, &distance).found().iter().find(|minimum| !minimum.is_kink)?.s;
+        scene.s = minima(&seen, &distance).found().iter().find(|minimum| minimum.kind != MinimumKind::Kink)?.s;
     }
     let shape = ShapeAt::<N>::new(scene.s);
     let here = distance(weighted_sum(&shape.values, |i| seen[i]))?;
