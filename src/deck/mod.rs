@@ -8,6 +8,7 @@ mod accuracy;
 mod axes;
 mod beam;
 mod body;
+mod contact;
 mod cost;
 mod damping;
 mod diagnostic;
@@ -36,6 +37,7 @@ mod shown;
 mod spring;
 mod stage;
 mod support;
+mod surface;
 mod sweep;
 mod units;
 mod words;
@@ -44,6 +46,7 @@ pub use accuracy::{Accuracy, is_named, without_stage};
 pub use axes::Axes;
 pub use beam::{Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Path, StationsWord};
 pub use body::Body;
+pub use contact::{Contact, ContactDamping, ContactRadius, EndsWord};
 pub use cost::{Cost, NormWord};
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, one_of};
 pub use effects::{EffectWord, Effects};
@@ -69,6 +72,7 @@ pub use shown::{hides_text, shown, shown_in_line};
 pub use spring::{Spring, SpringBody};
 pub use stage::{MOST_STEPS, RotatingFrame, STEP_TOLERANCE, Stage, StageBody, Until};
 pub use support::Support;
+pub use surface::{SideWord, Surface, SurfaceBody, SurfaceMotion, SurfacePoint, SurfaceWord};
 pub use sweep::{SweepFile, VaryBody, VaryTable};
 pub use words::Words;
 pub(crate) use words::words;
@@ -103,6 +107,10 @@ pub struct Deck {
     pub bodies: Vec<Body>,
     /// Springs and cables
     pub springs: Vec<Spring>,
+    /// Rigid surfaces
+    pub surfaces: Vec<Surface>,
+    /// Contacts of beams and bodies with surfaces
+    pub contacts: Vec<Contact>,
     /// Loads
     pub loads: Vec<Load>,
     /// Rayleigh factors of mass and stiffness
@@ -134,9 +142,10 @@ pub struct Deck {
 }
 
 /// Keys of a deck.
-const KEYS: [&str; 23] = [
+const KEYS: [&str; 25] = [
     "title", "units", "gravity", "param", "point", "material", "section", "beam", "support", "motion", "joint", "body",
-    "spring", "load", "initial", "history", "stage", "effects", "output", "cost", "accuracy", "damping", "expect",
+    "spring", "surface", "contact", "load", "initial", "history", "stage", "effects", "output", "cost", "accuracy",
+    "damping", "expect",
 ];
 
 /// Reads a deck. Errors and warnings are returned beside it, so that the scene can add its own;
@@ -236,6 +245,8 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         joints,
         bodies,
         springs: listed(&top, "spring", spring::read_spring),
+        surfaces: listed(&top, "surface", surface::read_surface),
+        contacts: listed(&top, "contact", contact::read_contact),
         loads: listed(&top, "load", load::read_load),
         damping: damping::read_damping(&top),
         initials: listed(&top, "initial", initial::read_initial),

@@ -59,6 +59,11 @@ impl Cone {
         })
     }
 
+    /// The centres of the spheres at both ends.
+    pub fn ends(&self) -> [Vec3; 2] {
+        [self.from, self.from + self.axis * self.length]
+    }
+
     /// The smaller one of the radii.
     pub fn least_radius(&self) -> f64 {
         self.radii[0].min(self.radii[1])

@@ -45,6 +45,16 @@ pub struct CarriedTraction {
     pub normal: Vec3,
 }
 
+impl CarriedTraction {
+    /// The traction carried by the smallest rotation n0 -> n; zero if the contact was open.
+    pub fn carried_to(&self, n: Vec3) -> Vec3 {
+        if self.force == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        self.force - (self.normal + n) * (n.dot(self.force) / (1.0 + self.normal.dot(n)))
+    }
+}
+
 /// The state of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {

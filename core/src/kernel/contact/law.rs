@@ -21,6 +21,9 @@ pub enum NormalLaw {
         multiplier: f64,
         /// K, force per length
         stiffness: f64,
+        /// The gap up to which a point without a force counts as touching: its tangent is that of a
+        /// contact
+        touching: f64,
     },
     /// Penalty with damping
     Penalty {
@@ -45,6 +48,11 @@ pub struct NormalForce<T = f64> {
 }
 
 impl<T: Real> NormalForce<T> {
+    /// True if neither a force nor a tangent is there.
+    pub fn is_open(&self) -> bool {
+        self.force.largest() <= 0.0 && self.over_gap.largest() == 0.0
+    }
+
     fn none() -> Self {
         Self { force: T::zero(), over_gap: T::zero(), over_rate: T::zero() }
     }
@@ -61,11 +69,12 @@ impl NormalLaw {
     /// The force of a gap that changes at `rate`.
     pub fn force<T: Real>(&self, gap: T, rate: T) -> NormalForce<T> {
         match *self {
-            Self::Augmented { multiplier, stiffness } => {
+            Self::Augmented { multiplier, stiffness, touching } => {
                 let force = T::constant(multiplier) - gap * stiffness;
-                if force.largest() <= 0.0 {
+                if force.largest() <= -touching * stiffness {
                     return NormalForce::none();
                 }
+                let force = if force.largest() > 0.0 { force } else { T::zero() };
                 NormalForce { force, over_gap: T::constant(-stiffness), over_rate: T::zero() }
             }
             Self::Penalty { stiffness, damping, toe } => {
@@ -167,7 +176,7 @@ mod tests {
     use super::*;
 
     const LAWS: [NormalLaw; 4] = [
-        NormalLaw::Augmented { multiplier: 3.0, stiffness: 50.0 },
+        NormalLaw::Augmented { multiplier: 3.0, stiffness: 50.0, touching: 0.0 },
         NormalLaw::Penalty { stiffness: 70.0, damping: 0.0, toe: 0.0 },
         NormalLaw::Penalty { stiffness: 70.0, damping: 1.5, toe: 0.0 },
         NormalLaw::Penalty { stiffness: 70.0, damping: 0.8, toe: 0.03 },

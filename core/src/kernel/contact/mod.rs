@@ -30,7 +30,7 @@ mod pair_tests;
 #[cfg(test)]
 mod tests;
 
-pub use along::{MAX_MINIMA, Minima, Minimum, MinimumKind, ShapeAt};
+pub use along::{MAX_MINIMA, Minima, Minimum, MinimumKind, ShapeAt, minima};
 pub use beam_pair::{PairLaw, PairSide, add_pair};
 pub use cone::Cone;
 pub use distance::{Distance, Feature, Undefined};

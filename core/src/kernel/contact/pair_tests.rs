@@ -180,7 +180,7 @@ fn random_pair<const NA: usize, const NB: usize>(
     let closest = bilateral(&a.map(|body| body.place), &b.map(|body| body.place)).found().next()?;
     let law = PairLaw {
         radii: [0.0; 2],
-        normal: NormalLaw::Augmented { multiplier: 0.0, stiffness: 1.0 },
+        normal: NormalLaw::Augmented { multiplier: 0.0, stiffness: 1.0, touching: 0.0 },
         friction: None,
         carried: CarriedTraction::default(),
         carrier: (random.between(0.0, NB as f64) as usize).min(NB - 1),
@@ -197,7 +197,7 @@ fn random_pair<const NA: usize, const NB: usize>(
     scene.law.normal = if damped {
         NormalLaw::Penalty { stiffness, damping: random.between(0.1, 0.5), toe: 0.0 }
     } else {
-        NormalLaw::Augmented { multiplier: random.between(0.1, 1.0), stiffness }
+        NormalLaw::Augmented { multiplier: random.between(0.1, 1.0), stiffness, touching: 0.0 }
     };
     if friction {
         set_friction(random, &mut scene);

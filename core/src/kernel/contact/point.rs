@@ -147,7 +147,7 @@ pub struct PointState<T = f64> {
 impl<T: Real> PointState<T> {
     /// The status of the point.
     pub fn status(&self) -> Status {
-        if self.normal_force.force.largest() <= 0.0 { Status::Open } else { self.traction.status }
+        if self.normal_force.is_open() { Status::Open } else { self.traction.status }
     }
 
     /// F = p n + t, the force on the element, in the axes of the carrier.

@@ -246,7 +246,7 @@ fn random_scene<const N: usize>(random: &mut Random, surface: &Surface, kind: Ki
         surface: surface.clone(),
         law: ContactLaw {
             radius: 0.1,
-            normal: NormalLaw::Augmented { multiplier: 0.0, stiffness: random.between(1.0, 5.0) },
+            normal: NormalLaw::Augmented { multiplier: 0.0, stiffness: random.between(1.0, 5.0), touching: 0.0 },
             friction: None,
             carried: CarriedTraction::default(),
             place: kind.place,
@@ -270,7 +270,7 @@ fn random_scene<const N: usize>(random: &mut Random, surface: &Surface, kind: Ki
     scene.law.normal = if kind.damped {
         NormalLaw::Penalty { stiffness, damping: random.between(0.1, 0.5), toe: random.between(0.0, 0.3) }
     } else {
-        NormalLaw::Augmented { multiplier: random.between(0.1, 1.0), stiffness }
+        NormalLaw::Augmented { multiplier: random.between(0.1, 1.0), stiffness, touching: 0.0 }
     };
     if kind.friction {
         set_friction(random, &mut scene, here.normal);

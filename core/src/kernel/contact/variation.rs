@@ -9,9 +9,10 @@ use super::along::ShapeAt;
 use crate::rotation::{Rotation, log};
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// A node as the carrier saw it at the last converged state.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct NodeBefore {
     /// y0 = Q0^T (x0 - c0)
     pub place: Vec3,
