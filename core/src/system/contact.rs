@@ -24,6 +24,8 @@ pub struct ContactMemory {
     pub first_factor: f64,
     /// Present factor on the first stiffness of contacts
     pub factor: f64,
+    /// True if points that slid go on sliding in the first tangent of a level
+    pub goes_on: bool,
     /// Energy that friction and damping of contacts have taken since the start of the run
     pub dissipated: f64,
     /// Energy per time that the damping of contacts takes
@@ -43,6 +45,7 @@ impl Default for ContactMemory {
             regime: ContactRegime::Augmented,
             first_factor: 1.0,
             factor: 1.0,
+            goes_on: true,
             dissipated: 0.0,
             damping_power: 0.0,
             deepest: 0.0,

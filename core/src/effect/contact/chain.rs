@@ -164,9 +164,22 @@ impl Chain {
         memory: Option<&ChainMemory>,
         at: &State,
     ) -> Vec<Candidate> {
+        if memory.is_none_or(|memory| memory.points.is_empty()) && self.is_far(surface, carrier, at) {
+            return Vec::new();
+        }
         let places = self.seen(carrier, at);
         let mut seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0) };
         seen.candidates(memory)
+    }
+
+    /// True if the surface is farther from the middle node than the chain reaches.
+    fn is_far(&self, surface: &Surface, carrier: &Carrier, at: &State) -> bool {
+        let place = |node: &ChainNode| node.place + at.q[node.node.u as usize];
+        let middle = place(&self.nodes[self.nodes.len() / 2]);
+        let Ok(distance) = surface.distance(carrier.on_surface(middle)) else { return false };
+        let gap = distance.value - self.radius * (1.0 + MARGIN);
+        let square = self.nodes.iter().map(|node| (place(node) - middle).squared()).fold(0.0, f64::max);
+        gap > 0.0 && REACH[self.order + 1] * square.sqrt() < gap
     }
 
     /// The number of the last point in memory of each candidate: the nearest ones first, each once.

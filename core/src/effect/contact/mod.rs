@@ -314,6 +314,7 @@ impl<'a> ChainNow<'a> {
         let carried = partner.map_or(CarriedTraction::default(), |point| CarriedTraction {
             force: point.traction,
             normal: point.normal,
+            slides: point.slides && contacts.goes_on,
         });
         let is_penalty = contacts.regime == ContactRegime::Penalty;
         let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.offset);
@@ -324,9 +325,13 @@ impl<'a> ChainNow<'a> {
     /// those of the last one.
     fn memory_of(&self, point: &PointNow, accepts: bool) -> PointMemory {
         let PointNow { candidate, state, law, .. } = point;
+        let slides = state.status() == Status::Slides;
         let rotation = &self.carrier.rotation.r;
-        let carried =
-            if accepts { CarriedTraction { force: state.traction.force, normal: state.normal } } else { law.carried };
+        let carried = if accepts {
+            CarriedTraction { force: state.traction.force, normal: state.normal, slides }
+        } else {
+            law.carried
+        };
         let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
         let gap = state.gap + law.radius - self.chain.radius;
         let force = state.normal_force.force;
@@ -342,7 +347,7 @@ impl<'a> ChainNow<'a> {
             gap,
             traction: carried.force,
             normal: carried.normal,
-            slides: state.status() == Status::Slides,
+            slides: carried.slides,
             offset: before.map_or(0.0, |before| before.offset),
             steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
             push: *rotation * state.force(),

@@ -27,6 +27,9 @@ use crate::tensor::{Mat3, Vec3};
 /// Normals that turn by more than 120 degrees between converged states: 1 + n0.n is below this.
 const MIN_NORMAL_COSINE: f64 = 0.5;
 
+/// A traction of at least this part of its limit is at the limit, but for round-off.
+const AT_LIMIT: f64 = 1.0 - 1e-9;
+
 /// Coulomb's law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionLaw {
@@ -43,6 +46,10 @@ pub struct CarriedTraction {
     pub force: Vec3,
     /// n0, the normal to which it was tangential
     pub normal: Vec3,
+    /// True if it slid: with its force at the limit it goes on sliding in the first tangent of a
+    /// step. Otherwise all points would stick there, and a rope that is pulled over a drum would be
+    /// torn apart by each first correction.
+    pub slides: bool,
 }
 
 impl CarriedTraction {
@@ -112,7 +119,8 @@ impl FrictionLaw {
         let trial = self.trial(carried, n, a);
         let limit = p * self.coefficient;
         let size = trial.force.norm();
-        if size.largest() <= limit.largest() {
+        let goes_on = carried.slides && size.largest() > 0.0 && size.largest() >= AT_LIMIT * limit.largest();
+        if size.largest() <= limit.largest() && !goes_on {
             return Traction { status: Status::Sticks, ..trial };
         }
         let inverse = T::one() / size;
@@ -184,7 +192,7 @@ mod tests {
             let law = FrictionLaw { coefficient: random.between(0.1, 0.8), stiffness: random.between(0.5, 5.0) };
             let n0 = random.direction();
             let free = random.vector(1.0);
-            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0 };
+            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
             let n = (n0 + random.vector(0.4)).normalized().unwrap();
             let a = random.vector(0.5);
             let p = random.between(0.1, 4.0);
@@ -214,7 +222,7 @@ mod tests {
             let law = FrictionLaw { coefficient: random.between(0.1, 0.8), stiffness: random.between(0.5, 5.0) };
             let n0 = random.direction();
             let free = random.vector(1.0);
-            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0 };
+            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
             let n = (n0 + random.vector(0.5)).normalized().unwrap();
             let traction = law.traction(&carried, n, random.between(0.1, 4.0), random.vector(0.5));
             least = least.min(law.dissipation(&carried, &traction));
@@ -229,7 +237,7 @@ mod tests {
         for _ in 0..300 {
             let n0 = random.direction();
             let free = random.vector(1.0);
-            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0 };
+            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
             let n = (n0 + random.vector(0.5)).normalized().unwrap();
             let law = FrictionLaw { coefficient: 1.0, stiffness: 1.0 };
             let traction = law.traction(&carried, n, 1e3, Vec3::ZERO);

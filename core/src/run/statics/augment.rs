@@ -36,7 +36,10 @@ impl StageRun<'_> {
     pub(super) fn attempt_with_contacts(&mut self, load: f64) -> Result<(), NewtonFailure> {
         loop {
             let failure = match self.attempt_once(load).and_then(|()| self.augment()) {
-                Ok(()) => return Ok(()),
+                Ok(()) => {
+                    self.state.contacts.goes_on = true;
+                    return Ok(());
+                }
                 Err(failure) => failure,
             };
             let may_soften = match failure {
@@ -50,8 +53,15 @@ impl StageRun<'_> {
                 | NewtonFailure::StepTooSmall { .. }
                 | NewtonFailure::Interrupted(_) => false,
             };
+            if may_soften && self.good.contacts.goes_on && self.good.contacts.touches() {
+                // Where all points slide nothing may hold a part.
+                self.good.contacts.goes_on = false;
+                self.state.copy_all_but_rates(self.good);
+                continue;
+            }
             let touched = self.good.contacts.touches() || self.state_touches();
             if !(may_soften && touched && self.good.contacts.first_factor > SOFTEST * GROWTH.sqrt()) {
+                self.good.contacts.goes_on = true;
                 return Err(failure);
             }
             self.set_first_factor(self.good.contacts.first_factor / GROWTH);
