@@ -158,16 +158,26 @@ impl SurfaceContacts {
         dissipated
     }
 
-    /// The length of beams with a force, or that touch without one.
+    /// The length of beams with a force, or without one between points that have some, as where a
+    /// beam lies flat.
     fn length_in_contact(&self, number: usize, at: &State) -> f64 {
         let mut length = 0.0;
         self.each_chain(at, Weights::NONE, &mut |_, chain| {
             if chain.chain.contact != number {
                 return;
             }
+            // Length without force since the last point with one, if all of it is near.
+            let mut between: Option<f64> = None;
             chain.each_point(Weights::NONE, &mut |point, _| {
-                let touches = point.partner.is_some() || point.state.gap <= TOUCHING * chain.laws.penetration;
-                length += if touches { chain.chain.share(point.candidate.along()) } else { 0.0 };
+                let share = chain.chain.share(point.candidate.along());
+                if point.partner.is_some() {
+                    length += share + between.unwrap_or_default();
+                    between = Some(0.0);
+                } else if point.state.gap <= chain.laws.penetration {
+                    between = between.map(|length| length + share);
+                } else {
+                    between = None;
+                }
             });
         });
         length

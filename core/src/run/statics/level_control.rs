@@ -225,6 +225,9 @@ impl LevelControl<'_, '_> {
             ContactChange::Slides => return StepOutcome::Good(signature),
             // A contact that comes or goes is a kink of the path, unless it goes to another branch.
             ContactChange::Touches if changes == 0 => return StepOutcome::Good(signature),
+            // Points that touch come and go between iterations, and augmentations push back what the
+            // first correction has pressed in.
+            ContactChange::None if changes == 0 && state.contacts.touches() => return StepOutcome::Good(signature),
             ContactChange::Touches | ContactChange::None => {}
         }
         if *soft {
