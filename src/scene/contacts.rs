@@ -20,16 +20,14 @@ pub fn check(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         else {
             continue;
         };
-        let what = match stage.body {
+        let refused = match stage.body {
             StageBody::Static { .. } | StageBody::Dynamic { .. } => continue,
-            StageBody::Path { .. } => "control = \"arc_length\"",
             StageBody::Modal { .. } | StageBody::Buckling { .. } if !rubs(deck) => continue,
-            StageBody::Modal { .. } => "a modal stage",
-            StageBody::Buckling { .. } => "a buckling stage",
+            StageBody::Path { .. } => "control = \"arc_length\" does not support [[contact]]",
+            StageBody::Modal { .. } => "a modal stage does not support [[contact]] with friction",
+            StageBody::Buckling { .. } => "a buckling stage does not support [[contact]] with friction",
         };
-        let with = if rubs(deck) { " with friction" } else { "" };
-        let message = format!("{what} does not support [[contact]]{with}");
-        let diagnostic = Diagnostic::error(message, stage.span.clone());
+        let diagnostic = Diagnostic::error(refused, stage.span.clone());
         let help = format!("give `{}` the `stages` in which it acts, without this one", contact.name.value);
         diagnostics.push(diagnostic.help(help).context(contact.name.span.clone(), "this contact"));
     }
