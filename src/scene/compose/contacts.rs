@@ -151,10 +151,7 @@ impl Composer<'_> {
                 self.report(unknown("surface", name, known));
                 continue;
             };
-            let carrier = match surfaces[surface].as_ref().map(|surface| surface.carrier) {
-                Some(SurfaceCarrier::Node { node, .. }) => Some(node),
-                _ => None,
-            };
+            let carrier = surfaces[surface].as_ref().and_then(SceneSurface::carrier_node);
             for party in &parties {
                 if carrier.is_some_and(|carrier| party.nodes.iter().any(|node| node.node.u == carrier.u)) {
                     let message = format!("the surface `{}` is carried by a node that would touch it", name.value);

@@ -77,12 +77,17 @@ impl SceneSurface {
         }
     }
 
-    /// The slots of its carrier.
-    pub(super) fn slots(&self) -> Option<[Slot; 2]> {
+    /// The node that carries it, if there is one.
+    pub fn carrier_node(&self) -> Option<Node> {
         match self.carrier {
-            SurfaceCarrier::Node { node, .. } => Some([node.u, node.p]),
+            SurfaceCarrier::Node { node, .. } => Some(node),
             SurfaceCarrier::Ground | SurfaceCarrier::Shift { .. } | SurfaceCarrier::Turn { .. } => None,
         }
+    }
+
+    /// The slots of its carrier.
+    pub(super) fn slots(&self) -> Option<[Slot; 2]> {
+        self.carrier_node().map(|node| [node.u, node.p])
     }
 
     /// Shows the data that a reflection must leave unchanged. `reference` is a place of the scene.
