@@ -52,6 +52,10 @@ failure_kinds! {
     NotConverged: "not_converged", Numerics;
     /// A mechanism or a loose part.
     Singular: "singular", Numerics;
+    /// A beam or a body penetrates a surface where its contact begins to act.
+    ContactStart: "contact_start", Deck;
+    /// A beam or a body may have passed through a surface.
+    ContactPassed: "contact_passed", Numerics;
     /// A force, a motion or a result is not finite.
     NonFinite: "non_finite", Numerics;
     /// The total energy grows without work of loads or drives.

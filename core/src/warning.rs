@@ -131,6 +131,12 @@ warning_kinds! {
     SimulatedInSpace: "simulated_in_space", Deck;
     /// Joints with multipliers are simulated by a scheme without dissipation.
     UndampedMultipliers: "undamped_multipliers", Deck;
+    /// Contacts of a dynamic stage penetrate by more than wanted.
+    ContactPenetration: "contact_penetration", Time;
+    /// Elements penetrate a surface between the points that carry contact forces.
+    HiddenPenetration: "hidden_penetration", Mesh;
+    /// A contact of a dynamic stage lasted few steps.
+    ShortContact: "short_contact", Time;
     /// Two points at one place are not joined.
     EqualPlaces: "equal_places", Deck;
     /// Beams of a section have no mass, while bodies have.

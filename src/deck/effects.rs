@@ -25,6 +25,10 @@ words! {
         FollowerTangent = "follower_tangent",
         /// The tangent of stress in beams
         GeometricStiffness = "geometric_stiffness",
+        /// Contacts with surfaces
+        Contact = "contact",
+        /// Friction of contacts
+        Friction = "friction",
         /// All that is not linear in the displacements
         LargeRotations = "large_rotations",
     }

@@ -64,8 +64,8 @@ struct ExplainedWord {
 
 #[rustfmt::skip]
 const EXPLAINED: &[Explained] = &[
-    Explained { table: "deck", written: &["contact", "contacts", "collision", "collisions", "gap"], help: "contact is not supported yet" },
-    Explained { table: "deck", written: &["friction"], help: "friction is not supported yet" },
+    Explained { table: "deck", written: &["contacts", "collision", "collisions", "gap"], help: "contacts of beams and bodies with surfaces are [[contact]] and [[surface]]" },
+    Explained { table: "deck", written: &["friction"], help: "`friction` is a key of [[contact]]" },
     Explained { table: "deck", written: &["cable", "cables", "rope", "ropes", "string", "strings", "wire", "wires", "chain", "tether", "mooring"], help: "a cable is a [[spring]] `between` two nodes with tension_only = true" },
     Explained { table: "deck", written: &["tendon", "tendons", "muscle", "muscles"], help: "tendons along a beam are not supported yet; a straight one is a [[spring]] `between` two nodes with tension_only = true" },
     Explained { table: "deck", written: &["boundary", "boundaries", "boundary_condition", "boundary_conditions", "bc", "bcs", "constraint", "constraints", "fix", "fixed", "clamp", "anchor", "encastre", "restraint", "restraints", "roller", "single_point_constraint", "sp"], help: "use [[support]]" },
@@ -458,7 +458,10 @@ mod tests {
         for (written, meant) in [("dt", "step"), ("type", "kind"), ("t_end", "end"), ("max_iter", "max_iterations")] {
             assert_eq!(for_key("[[stage]]", written, &stage), Hint::Use(meant), "{written}");
         }
-        assert_eq!(for_key("the deck", "contact", &["cost"]), Hint::Text("contact is not supported yet"));
+        assert_eq!(
+            for_key("the deck", "collision", &["cost"]),
+            Hint::Text("contacts of beams and bodies with surfaces are [[contact]] and [[surface]]")
+        );
         assert_eq!(for_key("[section.rod]", "diameter", &["radius"]), Hint::Text("use `radius`, half the diameter"));
         assert_eq!(for_word("kind", "hinge", &["spherical", "revolute"]), Hint::Use("revolute"));
     }

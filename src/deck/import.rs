@@ -66,6 +66,7 @@ pub fn import_up_to(most_rows: usize, text: &str, open: Open) -> Result<Imported
     let mut importer = Importer { text, open, most_rows, found: Vec::new(), sections: Vec::new(), tables: Vec::new() };
     importer.beams(&mut document);
     importer.outlines(&mut document);
+    importer.surfaces(&mut document);
     importer.histories(&mut document);
     let Importer { found, sections, tables, .. } = importer;
     if !found.is_empty() {
@@ -152,6 +153,21 @@ impl Importer<'_> {
                 && let Some(points) = self.table(&path, Csv::points_of_plane)
             {
                 *hole = points.into();
+            }
+        }
+    }
+
+    /// Centre lines of tubes, with a radius for each point where there is such a column.
+    fn surfaces(&mut self, document: &mut DocumentMut) {
+        let Some(surfaces) = document.get_mut("surface").and_then(Item::as_array_of_tables_mut) else { return };
+        for surface in surfaces.iter_mut() {
+            let Some(path) = named(surface.get("through")) else { continue };
+            let Some((points, radii)) = self.table(&path, |table| Ok((table.points()?, table.radii()))) else {
+                continue;
+            };
+            surface.insert("through", Item::Value(points.into()));
+            if let Some(radii) = radii.filter(|_| surface.get("radius").is_none()) {
+                surface.insert("radius", Item::Value(radii.into()));
             }
         }
     }
@@ -303,6 +319,11 @@ impl Csv {
         };
         let point = |row: &Vec<f64>| Value::from([row[first], row[second]].into_iter().collect::<Array>());
         Ok(self.rows.iter().map(point).collect())
+    }
+
+    /// The column `radius`.
+    fn radii(&self) -> Option<Array> {
+        Some(self.column(self.place("radius")?).collect())
     }
 
     /// The first column over time, and the one that is named or the second.

@@ -8,6 +8,7 @@ mod accuracy;
 mod axes;
 mod beam;
 mod body;
+mod contact;
 mod cost;
 mod damping;
 mod diagnostic;
@@ -39,6 +40,7 @@ mod shown;
 mod spring;
 mod stage;
 mod support;
+mod surface;
 mod sweep;
 mod units;
 mod words;
@@ -47,6 +49,7 @@ pub use accuracy::{Accuracy, is_named, without_stage};
 pub use axes::Axes;
 pub use beam::{Beam, FreeStrain, InterpolationWord, Path, StationsWord};
 pub use body::Body;
+pub use contact::{Contact, ContactDamping, ContactRadius, EndsWord};
 pub use cost::{Cost, NormWord};
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, one_of};
 pub use division::{Division, MOST_ELEMENTS};
@@ -72,13 +75,14 @@ pub use scheme::{SchemeName, SchemeWord};
 pub use section::{Section, SectionBody};
 pub use section_shape::{
     Airfoil, ComputedSection, ComputedShape, Fibre, Flanged, LeadingEdgeWord, MeshAim, Outline, Reference,
-    ReferenceWord, Region, Shape, ShapeWord, ShearFactor, SideWord, SkinPart, SkinSideWord, ThetaSenseWord,
-    TrailingEdgeWord, Wall, WallPlies, Walls, Web,
+    ReferenceWord, Region, Shape, ShapeWord, ShearFactor, SkinPart, SkinSideWord, ThetaSenseWord, TrailingEdgeWord,
+    Wall, WallPlies, WallSideWord, Walls, Web,
 };
 pub use shown::{hides_text, shown, shown_in_line};
 pub use spring::{Spring, SpringBody};
 pub use stage::{MOST_STEPS, RotatingFrame, STEP_TOLERANCE, Stage, StageBody, Until};
 pub use support::Support;
+pub use surface::{SideWord, Surface, SurfaceBody, SurfaceMotion, SurfacePoint, SurfaceWord};
 pub use sweep::{SweepFile, VaryBody, VaryTable};
 pub use words::Words;
 pub(crate) use words::words;
@@ -115,6 +119,10 @@ pub struct Deck {
     pub bodies: Vec<Body>,
     /// Springs and cables
     pub springs: Vec<Spring>,
+    /// Rigid surfaces
+    pub surfaces: Vec<Surface>,
+    /// Contacts of beams and bodies with surfaces
+    pub contacts: Vec<Contact>,
     /// Loads
     pub loads: Vec<Load>,
     /// Rayleigh factors of mass and stiffness
@@ -146,10 +154,10 @@ pub struct Deck {
 }
 
 /// Keys of a deck.
-const KEYS: [&str; 24] = [
+const KEYS: [&str; 26] = [
     "title", "units", "gravity", "param", "point", "material", "layup", "section", "beam", "support", "motion",
-    "joint", "body", "spring", "load", "initial", "history", "stage", "effects", "output", "cost", "accuracy",
-    "damping", "expect",
+    "joint", "body", "spring", "surface", "contact", "load", "initial", "history", "stage", "effects", "output",
+    "cost", "accuracy", "damping", "expect",
 ];
 
 /// Reads a deck. Errors and warnings are returned beside it, so that the scene can add its own;
@@ -254,6 +262,8 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         joints,
         bodies,
         springs: listed(&top, "spring", spring::read_spring),
+        surfaces: listed(&top, "surface", surface::read_surface),
+        contacts: listed(&top, "contact", contact::read_contact),
         loads: listed(&top, "load", load::read_load),
         damping: damping::read_damping(&top),
         initials: listed(&top, "initial", initial::read_initial),

@@ -237,6 +237,7 @@ mod tests {
             ("beam.section", vec!["csv"]),
             ("beam.through", vec!["csv"]),
             ("body", deck::body::KEYS.to_vec()),
+            ("contact", deck::contact::KEYS.to_vec()),
             ("cost", deck::cost::KEYS.to_vec()),
             ("damping", deck::damping::KEYS.to_vec()),
             ("effects", EffectWord::words().collect()),
@@ -268,6 +269,9 @@ mod tests {
             ("stage.frame", deck::stage::FRAME_KEYS.to_vec()),
             ("stage.until", deck::stage::UNTIL_KEYS.to_vec()),
             ("support", deck::support::KEYS.to_vec()),
+            ("surface", deck::surface::KEYS.to_vec()),
+            ("surface.history", deck::history::USE_KEYS.to_vec()),
+            ("surface.through", vec!["csv"]),
             ("units", deck::units::KEYS.to_vec()),
         ]
     }
@@ -281,6 +285,9 @@ mod tests {
         let warnings = WarningKind::ALL.iter().map(|kind| kind.name().to_string());
         vec![
             ("beam.interpolation", words::<InterpolationWord>()),
+            ("contact.ends", words::<deck::EndsWord>()),
+            ("surface.kind", words::<deck::SurfaceWord>()),
+            ("surface.side", words::<deck::SideWord>()),
             ("beam.stations_in", words::<StationsWord>()),
             ("cost.interpolation", words::<InterpolationWord>()),
             ("cost.norm", words::<NormWord>()),
@@ -382,7 +389,6 @@ mod tests {
         for (word, meant) in [("elemnts", Some("elements")), ("dt", Some("step")), ("hinge", Some("revolute"))] {
             assert_eq!((explain(word), similar(word, &[]).meant()), (Vec::new(), meant));
         }
-        assert_eq!(similar("contact", &[]).help().unwrap(), "contact is not supported yet");
         assert_eq!(similar("xylophone", &[]), Hint::None);
     }
 

@@ -53,7 +53,7 @@ words! {
 
 words! {
     /// `side = …`
-    pub enum SideWord {
+    pub enum WallSideWord {
         /// The wall lies to the left of its line, looking along it
         Left = "left",
         /// The line is the middle of the wall
@@ -347,7 +347,7 @@ pub struct Wall {
     /// Its plies
     pub plies: WallPlies,
     /// Side of the line on which it lies
-    pub side: SideWord,
+    pub side: WallSideWord,
     /// A point between the ends, of a round wall
     pub arc: Option<[f64; 2]>,
     /// Its place in the text
@@ -759,7 +759,7 @@ fn read_walls(table: &Table, layups: &[String]) -> Option<Walls> {
         return table.wrong_key("walls", "`walls` is a list of [from, to, thickness or layup]");
     };
     check_count(table.context, item, walls.len())?;
-    let side = table.word_or("side", SideWord::Middle)?;
+    let side = table.word_or("side", WallSideWord::Middle)?;
     let walls: Vec<Option<Wall>> = walls.iter().map(|wall| read_wall(table, wall, &points, side, layups)).collect();
     let walls: Vec<Wall> = walls.into_iter().collect::<Option<_>>()?;
     let theta_sense = table.word_or("theta_sense", ThetaSenseWord::Wall)?;
@@ -774,7 +774,7 @@ fn read_wall<'a>(
     section: &Table<'a>,
     item: &'a Item<'a>,
     points: &[(Spanned<String>, [f64; 2])],
-    side: SideWord,
+    side: WallSideWord,
     layups: &[String],
 ) -> Option<Wall> {
     let context = section.context;

@@ -5,7 +5,9 @@ use super::{OutputError, Units};
 use crate::deck::{self, ImportedTable};
 use crate::scene::{Reason, Scene};
 use beamsim_core::failure::FailureKind;
-use beamsim_core::run::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
+use beamsim_core::run::{
+    ContactCounters, Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt::{self, Display, Formatter};
@@ -210,8 +212,18 @@ struct CountersRecord {
     factorisations: u64,
     chart_switches: u64,
     mixed_elements: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    contact: Option<ContactRecord>,
     evaluations: Entries<u64>,
     linear_solvers: Vec<String>,
+}
+
+/// Work that contacts made; only in runs where something touched.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct ContactRecord {
+    augmentations: u64,
+    softenings: u64,
+    changes: u64,
 }
 
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -329,6 +341,9 @@ enum FailureNumbers {
     TurnsTooFar { node: String, angle: Number },
     LimitPoint { goal: Number, arc_length_increments: u64, end: Number },
     StepTooSmall { error: Number, share: Number },
+    Penetration { node: String, depth: Number },
+    ContactStart { contact: String, surface: String, node: String, depth: Number },
+    ContactPassed { node: String },
     NonFinite { effect: Option<String>, node: String },
     MeshTooCoarse { nodes: [String; 2], relative_rotation: Number },
     EnergyGrowth { grown: Number, largest: Number },
@@ -500,6 +515,7 @@ impl From<&Counters> for CountersRecord {
             factorisations: counters.work.factorisations,
             chart_switches: counters.work.chart_switches,
             mixed_elements: counters.mixed_elements,
+            contact: contact_record(&counters.contacts),
             evaluations: Entries(evaluations.collect()),
             linear_solvers: counters.linear_solvers.iter().map(ToString::to_string).collect(),
         }
@@ -606,6 +622,11 @@ fn failure_of(failure: &Failure, scene: &Scene) -> Option<Value> {
     serde_json::to_value(record).ok()
 }
 
+fn contact_record(contacts: &ContactCounters) -> Option<ContactRecord> {
+    let ContactCounters { augmentations, softenings, changes } = *contacts;
+    (*contacts != ContactCounters::default()).then_some(ContactRecord { augmentations, softenings, changes })
+}
+
 fn moment_of(failure: &Failure) -> Option<&Moment> {
     match failure {
         Failure::NotConverged { at, .. }
@@ -613,6 +634,9 @@ fn moment_of(failure: &Failure) -> Option<&Moment> {
         | Failure::LimitPoint { at, .. }
         | Failure::StepTooSmall { at, .. }
         | Failure::Singular { at, .. }
+        | Failure::Penetration { at, .. }
+        | Failure::ContactStart { at, .. }
+        | Failure::ContactPassed { at, .. }
         | Failure::NonFinite { at, .. }
         | Failure::MeshTooCoarse { at, .. }
         | Failure::EnergyGrowth { at, .. }
@@ -627,6 +651,9 @@ fn place_of(failure: &Failure) -> Option<&Place> {
         Failure::Singular { place, .. } => place.as_ref(),
         Failure::TurnsTooFar { .. }
         | Failure::LimitPoint { .. }
+        | Failure::Penetration { .. }
+        | Failure::ContactStart { .. }
+        | Failure::ContactPassed { .. }
         | Failure::NonFinite { .. }
         | Failure::MeshTooCoarse { .. }
         | Failure::EnergyGrowth { .. }
@@ -657,6 +684,16 @@ fn numbers_of(failure: &Failure) -> Option<FailureNumbers> {
         Failure::StepTooSmall { error, share, .. } => {
             FailureNumbers::StepTooSmall { error: Number(*error), share: Number(*share) }
         }
+        Failure::Penetration { node, depth, .. } => {
+            FailureNumbers::Penetration { node: node.clone(), depth: Number(*depth) }
+        }
+        Failure::ContactStart { contact, surface, node, depth, .. } => FailureNumbers::ContactStart {
+            contact: contact.clone(),
+            surface: surface.clone(),
+            node: node.clone(),
+            depth: Number(*depth),
+        },
+        Failure::ContactPassed { node, .. } => FailureNumbers::ContactPassed { node: node.clone() },
         Failure::NonFinite { effect, node, .. } => {
             FailureNumbers::NonFinite { effect: effect.map(String::from), node: node.clone() }
         }

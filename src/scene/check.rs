@@ -1,6 +1,7 @@
 //! Checks of a deck before its mechanics is built.
 
 use super::compose::Composition;
+use super::contacts;
 use super::mesh::Mesh;
 use crate::deck::{self, Deck, Diagnostic, LoadTarget, MotionWhat, SectionBody, Spanned, StageBody};
 use beamsim_core::model::{StageSet, Support};
@@ -19,6 +20,8 @@ pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         diagnostics.push(Diagnostic::whole("the deck has no [[beam]] and no [[body]]: there is nothing to simulate"));
     }
     refuse_twins("beam", deck.beams.iter().map(|b| &b.name), diagnostics);
+    refuse_twins("surface", deck.surfaces.iter().map(|surface| &surface.name), diagnostics);
+    contacts::check(deck, diagnostics);
     clocks_go_forward(deck, diagnostics);
     mass_where_needed(deck, diagnostics);
     warn_of_coarse_sections(deck, diagnostics);
@@ -28,7 +31,11 @@ pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     refuse_histories_on_paths(deck, diagnostics);
 }
 
-fn refuse_twins<'a>(kind: &str, names: impl Iterator<Item = &'a Spanned<String>>, diagnostics: &mut Vec<Diagnostic>) {
+pub(super) fn refuse_twins<'a>(
+    kind: &str,
+    names: impl Iterator<Item = &'a Spanned<String>>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
     let mut known: HashMap<&str, &Spanned<String>> = HashMap::new();
     for name in names {
         let first = known.entry(&name.value).or_insert(name);
@@ -187,8 +194,9 @@ pub fn histories_in(deck: &Deck, stage: usize) -> impl Iterator<Item = &Spanned<
     let loads = deck.loads.iter().filter(move |l| acts(&l.stages)).filter_map(|l| l.history.as_ref());
     let motions = deck.motions.iter().filter(move |m| acts(&m.stages)).filter_map(|m| m.history.as_ref());
     let motors = deck.joints.iter().filter_map(|j| j.motor.as_ref()).filter_map(|motor| motor.history.as_ref());
+    let surfaces = deck.surfaces.iter().filter(move |s| acts(&s.stages)).filter_map(|s| s.history.as_ref());
     let strains = deck.beams.iter().filter_map(|b| b.free_strain.as_ref()).filter_map(|f| f.history.as_ref());
-    let all = loads.chain(motions).chain(motors).chain(strains);
+    let all = loads.chain(motions).chain(motors).chain(strains).chain(surfaces);
     all.filter(move |history| history.goes_on_in(stage)).map(|history| &history.name)
 }
 

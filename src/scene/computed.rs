@@ -5,7 +5,7 @@ use super::names;
 use super::section::{self, Closed};
 use crate::deck::{
     self, ComputedSection, ComputedShape, Deck, Diagnostic, Elastic, Fibre, Reference, ReferenceWord, SectionBody,
-    Shape, SideWord, Span, Spanned, ThetaSenseWord, WallPlies,
+    Shape, Span, Spanned, ThetaSenseWord, WallPlies, WallSideWord,
 };
 use beamsim_core::model::{MassPerLength, SectionMatrices};
 use beamsim_core::section::airfoil;
@@ -326,9 +326,9 @@ impl Draft<'_> {
             let plies = self.plies(&wall.plies, &name, flips, &wall.span)?;
             let thickness: f64 = plies.iter().map(|ply| ply.thickness).sum();
             let left = match wall.side {
-                SideWord::Left => thickness,
-                SideWord::Middle => 0.5 * thickness,
-                SideWord::Right => 0.0,
+                WallSideWord::Left => thickness,
+                WallSideWord::Middle => 0.5 * thickness,
+                WallSideWord::Right => 0.0,
             };
             let bend = match wall.arc {
                 None => None,

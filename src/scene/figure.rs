@@ -11,21 +11,22 @@ use std::sync::Arc;
 
 /// Every node of every beam, the rigid bodies, and the ends of what joins two nodes.
 pub fn figure(mesh: &Mesh, bodies: &[Body], links: &[Link], elasticity: &[Arc<dyn StressField>]) -> Figure {
-    let line = |beam: &MeshBeam| Line {
+    let line = |(number, beam): (usize, &MeshBeam)| Line {
         name: beam.name.clone(),
         order: beam.order,
-        points: (0..beam.nodes.len()).map(|k| point(mesh, beam, k, elasticity)).collect(),
+        points: (0..beam.nodes.len()).map(|k| point(mesh, number, k, elasticity)).collect(),
     };
     let bare = |node, place| Place { nodes: vec![(node, place, 1.0)], frame: Mat3::IDENTITY, relative: false };
     let ends = |link: &Link| [0, 1].map(|k| bare(link.nodes[k], link.places[k]));
     Figure {
-        lines: mesh.beams.iter().map(line).collect(),
+        lines: mesh.beams.iter().enumerate().map(line).collect(),
         bodies: bodies.iter().map(|body| bare(body.node, body.place)).collect(),
         links: links.iter().map(ends).collect(),
     }
 }
 
-fn point(mesh: &Mesh, beam: &MeshBeam, k: usize, elasticity: &[Arc<dyn StressField>]) -> LinePoint {
+fn point(mesh: &Mesh, number: usize, k: usize, elasticity: &[Arc<dyn StressField>]) -> LinePoint {
+    let beam = &mesh.beams[number];
     let node = &mesh.nodes[beam.nodes[k]];
     let fraction = beam.fractions[k];
     let frame = beam.frame(fraction);
@@ -42,7 +43,7 @@ fn point(mesh: &Mesh, beam: &MeshBeam, k: usize, elasticity: &[Arc<dyn StressFie
     let compliance = Matrix6::from_fn(|i, j| stiffness[i][j]).try_inverse().unwrap_or_default();
     LinePoint {
         place: Place { nodes: vec![(node.node, node.place, 1.0)], frame, relative: false },
-        inside: BeamPoint { elasticity: elasticity.to_vec(), sides, frame },
+        inside: BeamPoint { beam: number, fraction, elasticity: elasticity.to_vec(), sides, frame },
         compliance: std::array::from_fn(|i| std::array::from_fn(|j| compliance[(i, j)])),
     }
 }

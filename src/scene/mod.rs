@@ -4,6 +4,7 @@ mod check;
 mod compose;
 mod computed;
 mod constraints;
+mod contacts;
 mod figure;
 mod joints;
 mod memory;
@@ -14,6 +15,7 @@ mod path;
 mod planar;
 mod rehearsal;
 mod section;
+mod surfaces;
 mod switches;
 
 pub use compose::Reason;
@@ -378,7 +380,9 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
             StageBody::Static { steps, adaptive } => {
                 // Along a path the load factor goes back: only what is linear in it may be followed
                 // there.
-                let linear = stage.frame.is_none() && check::histories_in(deck, stages.len() + 1).next().is_none();
+                let linear = stage.frame.is_none()
+                    && deck.contacts.is_empty()
+                    && check::histories_in(deck, stages.len() + 1).next().is_none();
                 let approach = match (adaptive, linear) {
                     (false, _) => Approach::Straight,
                     (true, false) => Approach::Parts,

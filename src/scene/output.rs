@@ -3,10 +3,11 @@
 
 use super::mesh::Mesh;
 use super::names::{Found, unknown};
-use crate::deck::{Deck, Diagnostic, ExpectBody, Spanned, hint, nearest, one_of};
+use crate::deck::{Contact, Deck, Diagnostic, ExpectBody, Spanned, hint, nearest, one_of};
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::probe::{
-    BeamPoint, COLUMNS, ColumnGroup, Need, Place, Probe, Reading, Source, clocks, find_column, group,
+    BeamPoint, COLUMNS, ColumnGroup, ENERGY_WITH_CONTACTS, Need, Place, Probe, Reading, Source, clocks, find_column,
+    group,
 };
 use beamsim_core::system::Node;
 use std::sync::Arc;
@@ -36,6 +37,10 @@ impl Columns<'_> {
                     Err(diagnostic) => diagnostics.push(diagnostic),
                 }
             }
+            probes.extend(self.line_contact(&node, &groups));
+        }
+        if groups.iter().any(|group| group.is_of_contact()) {
+            probes.extend((0..self.deck.contacts.len()).filter_map(|number| self.contact_probe(number)));
         }
         probes.extend(groups.iter().filter_map(|group| whole_probe(group)));
         probes
@@ -48,7 +53,7 @@ impl Columns<'_> {
         };
         let mut known: Vec<&'static ColumnGroup> = Vec::new();
         for key in keys {
-            let Some(group) = group(&key.value) else {
+            let Some(group) = group_of(self.deck, &key.value) else {
                 diagnostics.push(unknown_group(key));
                 continue;
             };
@@ -87,9 +92,31 @@ impl Columns<'_> {
             Source::Place(read) => Reading::Place(place, read),
             Source::Node(read) => Reading::Node(node_of(&place, name)?, read),
             Source::BeamPoint(read) => Reading::BeamPoint(self.beam_point(name, &found)?, read),
+            Source::Contact(_) => return Err(no_column(name)),
             Source::Scene(read) | Source::Run(read) => Reading::Whole(read),
         };
         Ok(Probe { names: group.names_at(&name.value), group, reading })
+    }
+
+    /// Forces of contacts per length at a node of a beam, which the group `contact` has, too.
+    fn line_contact(&self, name: &Spanned<String>, groups: &[&'static ColumnGroup]) -> Option<Probe> {
+        let own = group("line_contact")?;
+        if !groups.iter().any(|group| group.is_of_contact()) || groups.iter().any(|group| group.key == own.key) {
+            return None;
+        }
+        let probe = self.node_probe(name, own).ok()?;
+        let Reading::BeamPoint(point, _) = &probe.reading else { return None };
+        let beam = &self.mesh.beams[point.beam].name;
+        let touches = |contact: &Contact| contact.beams.iter().any(|name| name.value == *beam);
+        self.deck.contacts.iter().any(touches).then_some(probe)
+    }
+
+    /// Probe of the columns of a contact.
+    fn contact_probe(&self, number: usize) -> Option<Probe> {
+        let group = group("contact")?;
+        let Source::Contact(read) = group.source else { return None };
+        let names = group.names_at(&self.deck.contacts[number].name.value);
+        Some(Probe { names, group, reading: Reading::Contact(number, read) })
     }
 
     /// Point of a beam for strains and resultants.
@@ -112,7 +139,13 @@ impl Columns<'_> {
         if xi > 1.0 - 1e-9 && element + 1 < beam.elements.end {
             sides.push((element as u32 + 1, -1.0));
         }
-        Ok(BeamPoint { elasticity: self.elasticity.to_vec(), sides, frame: beam.frame(fraction) })
+        Ok(BeamPoint {
+            beam: number,
+            fraction,
+            elasticity: self.elasticity.to_vec(),
+            sides,
+            frame: beam.frame(fraction),
+        })
     }
 
     /// Probe and component of a column, by its name.
@@ -122,6 +155,11 @@ impl Columns<'_> {
             return Ok((probe, component));
         }
         let node = name.value.rsplit_once('.').map_or("", |(node, _)| node);
+        if group.is_of_contact() {
+            let number = self.deck.contacts.iter().position(|contact| contact.name.value == node);
+            let probe = number.and_then(|number| self.contact_probe(number)).ok_or_else(|| no_column(name))?;
+            return Ok((probe, component));
+        }
         let node = Spanned { value: node.to_string(), span: name.span.clone() };
         Ok((self.node_probe(&node, group)?, component))
     }
@@ -143,10 +181,23 @@ pub fn needs(deck: &Deck, need: Need) -> bool {
 /// Group and component of a column, by its name. Of groups with the same columns, the one that the
 /// deck writes.
 fn column_of(deck: &Deck, name: &str) -> Option<(&'static ColumnGroup, usize)> {
+    if let Some((owner, suffix)) = name.rsplit_once('.') {
+        let of_contact = deck.contacts.iter().any(|contact| contact.name.value == owner);
+        if of_contact || owner == "energy" {
+            let group = group_of(deck, if of_contact { "contact" } else { owner })?;
+            return Some((group, group.component(suffix)?));
+        }
+    }
     let (first, component) = find_column(name)?;
     let mut written = deck.output.columns.iter().flatten().filter_map(|key| group(&key.value));
     let instead = written.find(|group| group.has_columns_of(first));
     Some((instead.unwrap_or(first), component))
+}
+
+/// Group with this key in a deck: energies of contacts are there only where a contact is.
+fn group_of(deck: &Deck, key: &str) -> Option<&'static ColumnGroup> {
+    let group = group(key)?;
+    Some(if key == "energy" && !deck.contacts.is_empty() { &ENERGY_WITH_CONTACTS } else { group })
 }
 
 /// Probe of a group that belongs to no node.
@@ -155,7 +206,7 @@ fn whole_probe(group: &'static ColumnGroup) -> Option<Probe> {
         Source::Scene(read) | Source::Run(read) => {
             Some(Probe { names: group.own_names(), group, reading: Reading::Whole(read) })
         }
-        Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) => None,
+        Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) | Source::Contact(_) => None,
     }
 }
 

@@ -1,12 +1,13 @@
 //! `[effects]`: tables that are switched off are taken out of the deck before the scene is built.
 
-use crate::deck::{Deck, Diagnostic, EffectWord, SchemeWord, SpringBody, StageBody};
+use crate::deck::{ContactDamping, Deck, Diagnostic, EffectWord, SchemeWord, SpringBody, StageBody};
 use std::borrow::Cow;
 
 /// The deck without what is switched off and stands in tables of its own.
 pub fn deck(deck: &Deck) -> Cow<'_, Deck> {
     let [gravity, damping] = [EffectWord::Gravity, EffectWord::Damping].map(|word| deck.effects.allow(word));
-    if gravity && damping {
+    let friction = deck.effects.allow(EffectWord::Friction);
+    if gravity && damping && friction {
         return Cow::Borrowed(deck);
     }
     let mut deck = deck.clone();
@@ -15,6 +16,9 @@ pub fn deck(deck: &Deck) -> Cow<'_, Deck> {
     }
     if !damping {
         take_dampers_out(&mut deck);
+    }
+    if !friction {
+        deck.contacts.iter_mut().for_each(|contact| contact.friction = [0.0; 2]);
     }
     Cow::Owned(deck)
 }
@@ -28,6 +32,7 @@ fn take_dampers_out(deck: &mut Deck) {
             SpringBody::Between { damping, .. } => *damping = 0.0,
         }
     }
+    deck.contacts.iter_mut().for_each(|contact| contact.damping = ContactDamping::Factor(0.0));
 }
 
 /// Refuses effects that cannot be switched off in the stages of the deck.

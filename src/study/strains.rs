@@ -96,7 +96,7 @@ impl StrainRecord {
         let number = self.rows;
         self.rows += 1;
         let [all, of_doubling] = ROWS;
-        if number >= all && number % (1 << (number / of_doubling).ilog2()) != 0 {
+        if number >= all && !number.is_multiple_of(1 << (number / of_doubling).ilog2()) {
             return;
         }
         let stresses = |element| scene.stresses(element, at);

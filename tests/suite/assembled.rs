@@ -6,7 +6,7 @@ use beamsim::scene;
 use beamsim_core::integrate::{Increments, Method, Scheme, Step};
 use beamsim_core::kernel::Weights;
 use beamsim_core::model::{Assembly, Model, Schedule, StageKind, charts};
-use beamsim_core::system::State;
+use beamsim_core::system::{ContactRegime, State};
 use std::sync::Arc;
 
 const SECTION: &str = r#"
@@ -114,6 +114,43 @@ fn forces(assembly: &mut Assembly, state: &State, count: usize) -> Vec<f64> {
     out.iter().map(|v| -v).collect()
 }
 
+/// Surfaces around beams and bodies, and one that a body carries.
+const SURFACES: &str = r#"
+[[surface]]
+name = "shell"
+kind = "torus"
+at = [0.7, 0.5, 0]
+axis = [0.1, 0.2, 1]
+ring = 0.9
+radius = 0.2
+side = "inside"
+[[surface]]
+name = "ball"
+kind = "sphere"
+at = [2, 1, 1]
+radius = 1.3
+side = "inside"
+on = "away"
+[[surface]]
+name = "roller"
+kind = "cylinder"
+from = [0, 0, 0.2]
+to = [1, 0.1, 0.3]
+radius = 0.3
+rotate = [0, 1, 0]
+about = [0, 0, 0]
+angle = 0.4
+[[contact]]
+name = "rough"
+beams = ["a", "b"]
+nodes = ["tip"]
+surfaces = ["shell", "ball", "roller"]
+radius = { a = 0.1, b = 0.15, tip = 0.2 }
+stiffness = 5
+friction = [0.2, 0.4]
+damping = 0.1
+"#;
+
 fn tangent_holds(text: &str, incremental: bool, seed: u64) {
     let mut random = Random::new(seed);
     let (model, mut state, mut assembly) = scene_of(text);
@@ -128,6 +165,14 @@ fn tangent_holds(text: &str, incremental: bool, seed: u64) {
     }
     assert!(state.unwrapped.is_empty(), "rotations that no chart has changed are unwrapped as they are");
     charts::freeze(&mut state, &model.charted(StageKind::Dynamic).elements);
+    if let Some(contacts) = model.contacts() {
+        // Tractions and places of an earlier state, in which things touched.
+        state.contacts.regime = ContactRegime::Penalty;
+        let before = model.rest();
+        contacts.accept(&before, &mut state);
+        scatter(&assembly, &numbers(&mut random, 0.05), &mut state.q, 1.0);
+        assert!(state.contacts.touches());
+    }
     // Over increments, accelerations and velocities of rotations are functions of the unknown of the step.
     let step = Step { scheme: Scheme::lie_generalized_alpha(0.6), length: 0.8 };
     let combinations = if incremental {
@@ -195,5 +240,20 @@ fn everything_together_over_increments() {
     let lie = SECTION.replace("step = 0.1", "step = 0.1\nscheme = \"lie_generalized_alpha\"");
     for order in 1..=3 {
         tangent_holds(&(beams("relative", order) + &lie + EXTRAS), true, 51 + order as u64);
+    }
+}
+
+#[test]
+fn contacts_over_total_vectors() {
+    for order in 1..=3 {
+        tangent_holds(&(beams("relative", order) + SECTION + EXTRAS + SURFACES), false, 61 + order as u64);
+    }
+}
+
+#[test]
+fn contacts_over_increments() {
+    let lie = SECTION.replace("step = 0.1", "step = 0.1\nscheme = \"lie_generalized_alpha\"");
+    for order in 1..=3 {
+        tangent_holds(&(beams("relative", order) + &lie + EXTRAS + SURFACES), true, 71 + order as u64);
     }
 }

@@ -144,3 +144,8 @@ fn degenerate_scenes_hold() {
 fn minimal_decks_hold() {
     all_hold("decks/minimal", 55);
 }
+
+#[test]
+fn contacts_hold() {
+    all_hold("decks/contact", 5);
+}

@@ -7,6 +7,7 @@ mod builder;
 mod coefficients;
 mod command;
 mod constraints;
+mod contacts;
 mod convergence;
 mod corners;
 mod cost;

@@ -6,6 +6,8 @@
 //! outside, and free spins.
 
 mod batch;
+pub mod contact;
+mod contact_role;
 pub mod elasticity;
 pub mod inertia;
 pub mod joint;
@@ -16,6 +18,7 @@ pub mod spring;
 mod volume;
 
 pub use batch::{ByOrder, Connection};
+pub use contact_role::{ContactChange, ContactResultant, ContactSurvey, Contacts, Penetration};
 pub use volume::{VolumeElement, VolumeElements};
 
 use crate::kernel::Weights;
@@ -191,11 +194,14 @@ pub struct Roles<'a> {
     pub driven: Option<&'a dyn DrivenCoordinates>,
     /// Spins without resistance
     pub spins: Option<&'a dyn FreeSpins>,
+    /// Contacts, with a memory from one converged state to the next
+    pub contacts: Option<&'a dyn Contacts>,
 }
 
 impl Roles<'_> {
     /// No role beside forces.
-    pub const NONE: Self = Self { constraint: None, stresses: None, masses: None, driven: None, spins: None };
+    pub const NONE: Self =
+        Self { constraint: None, stresses: None, masses: None, driven: None, spins: None, contacts: None };
 }
 
 /// The role of constraints: gaps that multipliers close, and motors that prescribe them.

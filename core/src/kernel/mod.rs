@@ -5,6 +5,7 @@
 //! of g, so that loads, stiffness and inertia add up without a case distinction.
 
 pub mod beam;
+pub mod contact;
 pub mod elastic;
 pub mod element;
 pub mod inertia;

@@ -30,7 +30,7 @@ pub use section::{MassPerLength, SectionMatrices};
 pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError};
 
 use crate::effect::joint::nearest_angle;
-use crate::effect::{Constraint, Effect, Energy, Momentum, MotorState};
+use crate::effect::{Constraint, Contacts, Effect, Energy, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
 use crate::system::{Category, DofMap, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System, most_regions};
 use crate::tensor::Vec3;
@@ -209,6 +209,11 @@ impl Model {
     /// The effects that close gaps by multipliers.
     pub(super) fn constraints(&self) -> impl Iterator<Item = &dyn Constraint> {
         self.effects.iter().filter_map(|effect| effect.roles().constraint)
+    }
+
+    /// The effect of contacts, if the scene has one.
+    pub fn contacts(&self) -> Option<&dyn Contacts> {
+        self.effects.iter().find_map(|effect| effect.roles().contacts)
     }
 
     /// Shows the motors of joints.

@@ -49,6 +49,8 @@ pub enum Source {
     Node(fn(Node, &Snapshot, &mut Vec<f64>)),
     /// A point of one beam
     BeamPoint(fn(&BeamPoint, &Snapshot, &mut Vec<f64>)),
+    /// A contact, by its number
+    Contact(fn(usize, &Snapshot, &mut Vec<f64>)),
     /// The whole scene
     Scene(fn(&Snapshot, &mut Vec<f64>)),
     /// The clocks of the run, which begin every row
@@ -108,6 +110,18 @@ pub enum Quantity {
     AngularMomentum,
     /// Centre of mass
     CentreOfMass,
+    /// Gaps and penetrations of contacts
+    ContactGap,
+    /// Forces of contacts
+    ContactForce,
+    /// Moments of contacts
+    ContactMoment,
+    /// Forces of contacts per length
+    ContactForcePerLength,
+    /// Lengths of beams in contact
+    ContactLength,
+    /// Numbers of points in contact
+    ContactPoints,
     /// Angular frequency, the imaginary part of an eigenvalue of small vibrations
     AngularFrequency,
     /// Growth rate, the real part of an eigenvalue of small vibrations
@@ -165,7 +179,7 @@ pub enum MeshError {
 
 /// All groups: those of nodes, of the whole scene, and of the run. Where suffixes stand in two
 /// groups, the first is meant unless a deck writes the other.
-pub static COLUMNS: [ColumnGroup; 18] = [
+pub static COLUMNS: [ColumnGroup; 20] = [
     ColumnGroup {
         key: "u",
         parts: &[part("displacement", Quantity::Displacement, &["ux", "uy", "uz"])],
@@ -271,6 +285,31 @@ pub static COLUMNS: [ColumnGroup; 18] = [
         nearest: None,
     },
     ColumnGroup {
+        key: "line_contact",
+        parts: &[part("contact force per length", Quantity::ContactForcePerLength, &["cn", "cf"])],
+        source: Source::BeamPoint(|point, at, out| {
+            let contacts = at.model.contacts();
+            let force =
+                contacts.map_or([0.0; 2], |contacts| contacts.force_along(point.beam, point.fraction, at.state));
+            out.extend(force);
+        }),
+        needs: &[],
+        nearest: None,
+    },
+    ColumnGroup {
+        key: "contact",
+        parts: &[
+            part("contact gap", Quantity::ContactGap, &["gap", "depth"]),
+            part("contact force", Quantity::ContactForce, &["normal", "friction", "fx", "fy", "fz"]),
+            part("contact moment", Quantity::ContactMoment, &["mx", "my", "mz"]),
+            part("contact length", Quantity::ContactLength, &["length"]),
+            part("contact points", Quantity::ContactPoints, &["points", "sliding"]),
+        ],
+        source: Source::Contact(contact),
+        needs: &[],
+        nearest: None,
+    },
+    ColumnGroup {
         key: "energy",
         parts: &[part("energy", Quantity::Energy, &["kinetic", "strain", "external", "damped", "total"])],
         source: Source::Scene(energy),
@@ -311,6 +350,19 @@ pub static COLUMNS: [ColumnGroup; 18] = [
     },
 ];
 
+/// The columns of `energy` in scenes with contacts.
+pub static ENERGY_WITH_CONTACTS: ColumnGroup = ColumnGroup {
+    key: "energy",
+    parts: &[part(
+        "energy",
+        Quantity::Energy,
+        &["kinetic", "strain", "external", "damped", "contact", "friction", "total"],
+    )],
+    source: Source::Scene(energy_with_contacts),
+    needs: &[Need::EnergyAccount],
+    nearest: None,
+};
+
 /// Columns of modes and critical loads, which have the number of a mode before the dot.
 static MODE_COLUMNS: [ColumnPart; 3] = [
     part("angular frequency", Quantity::AngularFrequency, &["omega"]),
@@ -341,8 +393,8 @@ pub fn find_column(name: &str) -> Option<(&'static ColumnGroup, usize)> {
     let of_scene = COLUMNS.iter().find(|group| group.is_of_scene() && group.key == owner);
     let component = |group: &'static ColumnGroup| Some((group, group.component(suffix)?));
     match of_scene {
-        Some(group) => component(group),
-        None => COLUMNS.iter().filter(|group| group.is_of_node()).find_map(component),
+        Some(group) => component(group).or_else(|| component(&ENERGY_WITH_CONTACTS).filter(|_| group.key == "energy")),
+        None => COLUMNS.iter().filter(|group| group.is_of_node() || group.is_of_contact()).find_map(component),
     }
 }
 
@@ -391,13 +443,18 @@ impl ColumnGroup {
     pub fn is_of_node(&self) -> bool {
         match self.source {
             Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) => true,
-            Source::Scene(_) | Source::Run(_) => false,
+            Source::Contact(_) | Source::Scene(_) | Source::Run(_) => false,
         }
     }
 
     /// True if the columns belong to a section of one beam, which need not be at a node.
     pub fn is_of_section(&self) -> bool {
         matches!(self.source, Source::BeamPoint(_))
+    }
+
+    /// True if the columns belong to a contact.
+    pub fn is_of_contact(&self) -> bool {
+        matches!(self.source, Source::Contact(_))
     }
 
     /// True if the columns belong to the whole scene.
@@ -421,7 +478,7 @@ impl ColumnGroup {
 
 impl Quantity {
     /// All quantities.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 30] = [
         Self::Displacement,
         Self::Position,
         Self::Rotation,
@@ -441,6 +498,12 @@ impl Quantity {
         Self::Momentum,
         Self::AngularMomentum,
         Self::CentreOfMass,
+        Self::ContactGap,
+        Self::ContactForce,
+        Self::ContactMoment,
+        Self::ContactForcePerLength,
+        Self::ContactLength,
+        Self::ContactPoints,
         Self::AngularFrequency,
         Self::GrowthRate,
         Self::Stage,
@@ -451,17 +514,25 @@ impl Quantity {
     /// Exponents of its units.
     pub fn dimension(self) -> Dimension {
         match self {
-            Self::Orientation | Self::SectionAxis | Self::Strain | Self::Stage | Self::LoadFactor => Dimension::NUMBER,
+            Self::Orientation
+            | Self::SectionAxis
+            | Self::Strain
+            | Self::ContactPoints
+            | Self::Stage
+            | Self::LoadFactor => Dimension::NUMBER,
             Self::Rotation => Dimension::ANGLE,
             Self::AngularVelocity | Self::AngularFrequency => Dimension::ANGLE.times_time(-1),
             Self::AngularAcceleration => Dimension::ANGLE.times_time(-2),
             Self::GrowthRate => Dimension::NUMBER.times_time(-1),
-            Self::Displacement | Self::Position | Self::CentreOfMass => Dimension::LENGTH,
+            Self::Displacement | Self::Position | Self::CentreOfMass | Self::ContactGap | Self::ContactLength => {
+                Dimension::LENGTH
+            }
+            Self::ContactForcePerLength => Dimension { length: -1, ..Dimension::FORCE },
             Self::Velocity => Dimension::LENGTH.times_time(-1),
             Self::Acceleration => Dimension::LENGTH.times_time(-2),
             Self::Curvature => Dimension { length: -1, ..Dimension::NUMBER },
-            Self::ReactionForce | Self::SectionForce => Dimension::FORCE,
-            Self::ReactionMoment | Self::SectionMoment | Self::Energy => Dimension::MOMENT,
+            Self::ReactionForce | Self::SectionForce | Self::ContactForce => Dimension::FORCE,
+            Self::ReactionMoment | Self::SectionMoment | Self::ContactMoment | Self::Energy => Dimension::MOMENT,
             Self::Momentum => Dimension::FORCE.times_time(1),
             Self::AngularMomentum => Dimension::MOMENT.times_time(1),
             Self::Time => Dimension::TIME,
@@ -477,6 +548,7 @@ impl Quantity {
             Self::Acceleration => Some(Self::AngularAcceleration),
             Self::ReactionForce => Some(Self::ReactionMoment),
             Self::SectionForce => Some(Self::SectionMoment),
+            Self::ContactForce => Some(Self::ContactMoment),
             Self::Strain => Some(Self::Curvature),
             Self::Position
             | Self::Rotation
@@ -491,6 +563,11 @@ impl Quantity {
             | Self::Momentum
             | Self::AngularMomentum
             | Self::CentreOfMass
+            | Self::ContactGap
+            | Self::ContactMoment
+            | Self::ContactForcePerLength
+            | Self::ContactLength
+            | Self::ContactPoints
             | Self::AngularFrequency
             | Self::GrowthRate
             | Self::Stage
@@ -520,6 +597,12 @@ impl Quantity {
             | Self::Momentum
             | Self::AngularMomentum
             | Self::CentreOfMass
+            | Self::ContactGap
+            | Self::ContactForce
+            | Self::ContactMoment
+            | Self::ContactForcePerLength
+            | Self::ContactLength
+            | Self::ContactPoints
             | Self::AngularFrequency
             | Self::GrowthRate
             | Self::Stage
@@ -577,6 +660,27 @@ fn reaction(node: Node, at: &Snapshot, out: &mut Vec<f64>) {
 fn energy(at: &Snapshot, out: &mut Vec<f64>) {
     let ledger = at.ledger;
     out.extend([ledger.kinetic, ledger.strain, ledger.external, ledger.damped, ledger.total()]);
+}
+
+/// The energy account with the parts of contacts.
+fn energy_with_contacts(at: &Snapshot, out: &mut Vec<f64>) {
+    let ledger = at.ledger;
+    out.extend([ledger.kinetic, ledger.strain, ledger.external, ledger.damped]);
+    out.extend([ledger.contact, ledger.friction, ledger.total()]);
+}
+
+/// Gap, forces, moment about the origin (or about the node that carries the surface), length and
+/// points of a contact; zeros where contacts are switched off.
+fn contact(number: usize, at: &Snapshot, out: &mut Vec<f64>) {
+    let Some(contacts) = at.model.contacts() else {
+        out.extend([0.0; 13]);
+        return;
+    };
+    let sum = contacts.resultant(number, at.state);
+    out.extend([sum.gap, (-sum.gap).max(0.0), sum.normal, sum.friction]);
+    out.extend(sum.force.0);
+    out.extend(sum.moment.0);
+    out.extend([sum.length, sum.points as f64, sum.sliding as f64]);
 }
 
 /// Momentum, angular momentum about the origin, and centre of mass.

@@ -7,8 +7,8 @@ mod place;
 mod reading;
 
 pub use columns::{
-    COLUMNS, ColumnGroup, ColumnPart, Dimension, MeshError, Nearest, Need, Quantity, Source, clocks, find_column,
-    find_part, group, quantity,
+    COLUMNS, ColumnGroup, ColumnPart, Dimension, ENERGY_WITH_CONTACTS, MeshError, Nearest, Need, Quantity, Source,
+    clocks, find_column, find_part, group, quantity,
 };
 pub use figure::{Figure, Line, LinePoint, Look};
 pub use place::{BeamPoint, Place};

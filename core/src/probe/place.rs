@@ -105,6 +105,10 @@ impl Place {
 /// A point within beam elements: between two elements of a beam it has two sides.
 #[derive(Clone)]
 pub struct BeamPoint {
+    /// Number of the beam in the scene
+    pub beam: usize,
+    /// The part of the length of the beam before it
+    pub fraction: f64,
     /// Elasticity of the scene, one for each way to interpolate rotations
     pub elasticity: Vec<Arc<dyn StressField>>,
     /// For each side the number of the element in the scene, and xi in it

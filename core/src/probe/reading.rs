@@ -25,6 +25,8 @@ pub enum Reading {
     Node(Node, fn(Node, &Snapshot, &mut Vec<f64>)),
     /// A point of one beam
     BeamPoint(BeamPoint, fn(&BeamPoint, &Snapshot, &mut Vec<f64>)),
+    /// A contact, by its number
+    Contact(usize, fn(usize, &Snapshot, &mut Vec<f64>)),
     /// The whole scene, or the clocks of the run
     Whole(fn(&Snapshot, &mut Vec<f64>)),
 }
@@ -36,6 +38,7 @@ impl Probe {
             Reading::Place(place, read) => read(place, at, out),
             Reading::Node(node, read) => read(*node, at, out),
             Reading::BeamPoint(point, read) => read(point, at, out),
+            Reading::Contact(number, read) => read(*number, at, out),
             Reading::Whole(read) => read(at, out),
         }
     }
@@ -44,7 +47,7 @@ impl Probe {
     pub fn place(&self) -> Option<&Place> {
         match &self.reading {
             Reading::Place(place, _) => Some(place),
-            Reading::Node(..) | Reading::BeamPoint(..) | Reading::Whole(_) => None,
+            Reading::Node(..) | Reading::BeamPoint(..) | Reading::Contact(..) | Reading::Whole(_) => None,
         }
     }
 }

@@ -95,6 +95,35 @@ pub enum Failure {
         /// The node and the direction that move freely
         place: Option<Place>,
     },
+    /// A contact penetrates too deeply after the largest number of augmentations.
+    Penetration {
+        /// When
+        at: Moment,
+        /// The node
+        node: String,
+        /// The depth, a length
+        depth: f64,
+    },
+    /// A beam or a body penetrates a surface where its contact begins to act.
+    ContactStart {
+        /// When
+        at: Moment,
+        /// The contact
+        contact: String,
+        /// The surface
+        surface: String,
+        /// The node
+        node: String,
+        /// The depth, a length
+        depth: f64,
+    },
+    /// A node may have passed through a surface.
+    ContactPassed {
+        /// When
+        at: Moment,
+        /// The node
+        node: String,
+    },
     /// A force, a motion or a result that is not finite
     NonFinite {
         /// When
@@ -159,7 +188,10 @@ impl Failure {
             Self::NotConverged { .. }
             | Self::TurnsTooFar { .. }
             | Self::LimitPoint { .. }
-            | Self::StepTooSmall { .. } => FailureKind::NotConverged,
+            | Self::StepTooSmall { .. }
+            | Self::Penetration { .. } => FailureKind::NotConverged,
+            Self::ContactStart { .. } => FailureKind::ContactStart,
+            Self::ContactPassed { .. } => FailureKind::ContactPassed,
             Self::Singular { .. } => FailureKind::Singular,
             Self::NonFinite { .. } => FailureKind::NonFinite,
             Self::MeshTooCoarse { .. } => FailureKind::MeshTooCoarse,
@@ -186,7 +218,7 @@ impl Failure {
 
     /// True if no balance was found: another way to it may find one.
     pub(super) fn is_of_balance(&self) -> bool {
-        matches!(self, Self::NotConverged { .. } | Self::Singular { .. })
+        matches!(self, Self::NotConverged { .. } | Self::Singular { .. } | Self::Penetration { .. })
     }
 }
 
@@ -253,6 +285,21 @@ impl fmt::Display for Failure {
                 write!(f, "{place} is not constrained ({at}): the structure is a mechanism, or a part is loose")
             }
             Self::Singular { at, place: None } => write!(f, "the tangent matrix is singular at {at}"),
+            Self::Penetration { at, node, depth } => write!(
+                f,
+                "a contact at node \"{node}\" penetrates by {depth:.3e}, more than `penetration` allows, after the \
+                 largest number of augmentations ({at})"
+            ),
+            Self::ContactStart { at, contact, surface, node, depth } => write!(
+                f,
+                "contact \"{contact}\" begins with a penetration: node \"{node}\" is {depth:.3e} inside surface \
+                 \"{surface}\" ({at})"
+            ),
+            Self::ContactPassed { at, node } => write!(
+                f,
+                "node \"{node}\" may have passed through a surface: in one step it moves by more than the depth of the \
+                 surface ({at})"
+            ),
             Self::NonFinite { at, effect, node } => {
                 let effect = effect.unwrap_or("the sum of forces");
                 write!(f, "{effect} is infinite or not a number at \"{node}\" ({at})")

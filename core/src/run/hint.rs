@@ -30,6 +30,14 @@ impl Failure {
                     .into(),
             ),
             Self::Singular { at, .. } => Some(has(at)?.hint_of_mechanism()),
+            Self::Penetration { .. } => {
+                Some("take more `steps`, a larger `penetration`, or a larger `stiffness` of the contact".into())
+            }
+            Self::ContactStart { .. } => Some(
+                "move the surface or the beam apart (the radius of the contact counts), or allow a larger `penetration`"
+                    .into(),
+            ),
+            Self::ContactPassed { .. } => Some("take more `steps`, or a smaller `step`".into()),
             Self::MeshTooCoarse { .. } => Some("use more `elements` there".into()),
             Self::EnergyGrowth { at, .. } => {
                 let cures = [has(at)?.damping(), Some("take a smaller `step`".into())];

@@ -41,4 +41,4 @@ pub use refusal::{refusal, refusal_help};
 pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use results::{CriticalKind, CriticalLoad, Event, EventKind, Mode, StageResult};
 pub use sequence::Run;
-pub use snapshot::{Counters, Snapshot};
+pub use snapshot::{ContactCounters, Counters, Snapshot};

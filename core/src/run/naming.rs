@@ -36,6 +36,10 @@ impl StageRun<'_> {
                 Failure::TurnsTooFar { at, node: self.model.node_at(slot), angle }
             }
             NewtonFailure::LeapsTooFar { element, angle } => self.name_coarse(element, angle),
+            NewtonFailure::Penetrates { slot, depth } => {
+                Failure::Penetration { at, node: self.model.node_at(slot), depth }
+            }
+            NewtonFailure::Passes { slot } => Failure::ContactPassed { at, node: self.model.node_at(slot) },
             NewtonFailure::NotFinite { effect, slot } => {
                 Failure::NonFinite { at, effect, node: self.model.node_at(slot) }
             }

@@ -12,8 +12,9 @@ use super::rehearsal::lacking;
 use super::snapshot::Counters;
 use super::stage_run::{Analysis, StageRun, newton_for, unless_interrupted};
 use super::statics::{ArcLength, LoadLevels};
-use crate::model::{Assembly, Model};
-use crate::system::DofMap;
+use crate::effect::ContactChange;
+use crate::model::{Assembly, Model, StageKind};
+use crate::system::{ContactRegime, DofMap};
 use std::sync::Arc;
 
 /// A run in progress, between its stages.
@@ -59,6 +60,7 @@ impl<'o> Run<'o> {
 
     fn carry_out_stage(&mut self, number: usize) -> Result<(), Failure> {
         let work = self.plan.stages[number].work;
+        let contacts = self.run.state.contacts.clone();
         let mut run = match self.begun.take() {
             None => self.open_stage(number)?,
             Some(begun) => self.open_stage_again(number, begun)?,
@@ -72,6 +74,10 @@ impl<'o> Run<'o> {
             StageWork::Dynamic(steps) => carry_out(Dynamics::new(stage, steps)),
         }?;
         run.hand_over();
+        if !work.kind().advances_state() {
+            // Such stages only look.
+            self.run.state.contacts = contacts;
+        }
         self.run.schedule.end_stage(&self.model, &self.run.state);
         Ok(())
     }
@@ -109,6 +115,16 @@ impl<'o> Run<'o> {
         let assembly = Assembly::new(&stage.context(number), dof_map, &self.model);
         let newton = newton_for(stage, &assembly, &self.model)?;
         let RunState { schedule, state, good, counters, issued, bookkeeper, past } = &mut self.run;
+        if let Some(contacts) = self.model.contacts() {
+            let advances = stage.work.kind().advances_time();
+            let regime = if advances { ContactRegime::Penalty } else { ContactRegime::Augmented };
+            if std::mem::replace(&mut state.contacts.regime, regime) != regime && advances {
+                contacts.begin_penalty(state);
+            }
+            if stage.work.kind() == StageKind::Modal {
+                contacts.hold(state);
+            }
+        }
         Ok(StageRun {
             keeps_account: self.plan.energy,
             plan: &self.plan,
@@ -131,6 +147,7 @@ impl<'o> Run<'o> {
             soft: false,
             prescribed_increment: Vec::new(),
             unflattened: Vec::new(),
+            contact_change: ContactChange::None,
             resumed: None,
             is_judged: false,
         })

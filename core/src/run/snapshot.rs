@@ -43,6 +43,8 @@ pub struct Counters {
     pub cutbacks: u64,
     /// Mixed elements, summed over converged states
     pub mixed_elements: u64,
+    /// Augmentations and changes of contacts
+    pub contacts: ContactCounters,
     /// Events, stability, warnings
     pub findings: Findings,
     /// Iterations, factorisations, chart switches, seconds
@@ -53,6 +55,17 @@ pub struct Counters {
     /// The linear solvers that were used
     #[serde(deserialize_with = "names")]
     pub linear_solvers: Vec<&'static str>,
+}
+
+/// Work that contacts made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+pub struct ContactCounters {
+    /// Augmentations of multipliers in load levels
+    pub augmentations: u64,
+    /// Levels that were tried again with a softer contact
+    pub softenings: u64,
+    /// Levels and steps in which contacts have come or gone, or begun to slide or to stick
+    pub changes: u64,
 }
 
 /// Names of a checkpoint, which live as long as the program: a handful each time a run is resumed.

@@ -10,6 +10,7 @@ use super::observer::Observer;
 use super::plan::{Plan, Stage};
 use super::results::StageResult;
 use super::snapshot::{Counters, Snapshot};
+use crate::effect::{ContactChange, Penetration};
 use crate::interrupt;
 use crate::model::{Assembly, Charted, Model, Motion, Schedule, StageError, Timeline, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure};
@@ -85,6 +86,8 @@ pub(super) struct StageRun<'r> {
     /// The unknowns of the last balance before it was flattened, which its stiffness belongs to; in
     /// static stages in tilted planes
     pub unflattened: Vec<Vec3>,
+    /// Changes of contacts in the present step
+    pub contact_change: ContactChange,
     /// Where a checkpoint has left the stage; taken by its analysis
     pub resumed: Option<AnalysisCheckpoint>,
     /// The analysis is at its end, and judged.
@@ -147,6 +150,16 @@ impl StageRun<'_> {
         Moment { stage: self.number + 1, time: self.state.time, load: self.state.load }
     }
 
+    /// Refuses a run that begins with a penetration.
+    pub fn refuse_penetration(&self) -> Result<(), Failure> {
+        let Some(contacts) = self.model.contacts().filter(|_| self.number == 0) else { return Ok(()) };
+        let Some(Penetration { contact, surface, slot, depth }) = contacts.penetrates(self.state) else {
+            return Ok(());
+        };
+        let node = self.model.node_at(slot as usize);
+        Err(Failure::ContactStart { at: self.moment(), contact, surface, node, depth })
+    }
+
     /// Opens the energy account of the stage; at the start of the run also writes the first row.
     pub fn open_account(&mut self) -> Result<(), Failure> {
         if self.keeps_account {
@@ -177,8 +190,16 @@ impl StageRun<'_> {
         self.refuse_infinities()?;
         self.flatten();
         self.wind()?;
-        self.model.remember(self.state);
+        self.remember();
         Ok(())
+    }
+
+    /// Writes the memory of a state that becomes the good one: turns of joints, contacts.
+    pub fn remember(&mut self) {
+        self.model.remember(self.state);
+        if let Some(contacts) = self.model.contacts() {
+            contacts.accept(self.good, self.state);
+        }
     }
 
     /// Takes out of the state what round-off has put aside of a tilted plane.
@@ -311,6 +332,16 @@ impl StageRun<'_> {
         let mut unwrapped = springs.chain(self.model.sprung_joints.iter().copied().map(of_joint));
         match unwrapped.find(|&(_, angle)| angle > PI) {
             Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
+            None => Ok(()),
+        }
+    }
+
+    /// Between the last good state and this one a node may have passed through a surface: smaller
+    /// steps tell.
+    pub fn refuse_passing(&self) -> Result<(), NewtonFailure> {
+        let Some(contacts) = self.model.contacts() else { return Ok(()) };
+        match contacts.passed(self.good, self.state) {
+            Some(slot) => Err(NewtonFailure::Passes { slot: slot as usize }),
             None => Ok(()),
         }
     }

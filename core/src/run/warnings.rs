@@ -4,6 +4,7 @@ use super::energy::is_unbalanced;
 use super::failure::Moment;
 use super::findings::Warning;
 use super::stage_run::StageRun;
+use crate::effect::Penetration;
 use crate::interrupt;
 use crate::kernel::Weights;
 use crate::model::charts;
@@ -78,6 +79,18 @@ impl StageRun<'_> {
     }
 
     /// A stage that ends at rest takes kinetic energy away from what moved before.
+    /// Warns of a static stage that ends with penetrations between the points of contact.
+    pub fn warn_of_hidden_penetration(&mut self) {
+        let Some(contacts) = self.model.contacts() else { return };
+        let Some(Penetration { contact, surface, depth, .. }) = contacts.hidden_penetration(self.state) else { return };
+        let stage = self.number + 1;
+        let message = format!(
+            "stage {stage} ends with a penetration of {depth:.3e} of contact \"{contact}\" into surface \"{surface}\", \
+             between the points that carry forces: use more elements there"
+        );
+        self.warn(WarningKind::HiddenPenetration, message);
+    }
+
     pub fn warn_of_standstill(&mut self) {
         let (Some(first), true) = (self.bookkeeper.first(), self.plan.energy && self.past.moving) else { return };
         let share = (self.bookkeeper.ledger().total() - first) / self.bookkeeper.scale();

@@ -41,6 +41,18 @@ pub enum NewtonFailure {
     },
     /// The tangent is singular, with the null vector if it was found.
     Singular(Option<NullVector>),
+    /// A contact penetrates too deeply after the largest number of augmentations.
+    Penetrates {
+        /// Slot of a node at the contact
+        slot: usize,
+        /// Depth of the penetration
+        depth: f64,
+    },
+    /// A node may have passed through a surface.
+    Passes {
+        /// Slot of the node
+        slot: usize,
+    },
     /// A force is not finite.
     NotFinite {
         /// Effect that computed the force; `None` if only a sum overflows

@@ -1,5 +1,6 @@
 //! State of a scene: a 3-vector of unknowns per slot, with its rates.
 
+use super::contact::ContactMemory;
 use super::field::Field;
 use crate::kernel::NodeMotion;
 use crate::kernel::inertia::Spin;
@@ -80,6 +81,8 @@ pub struct State {
     pub(crate) anchor: Option<Arc<Anchor>>,
     /// Angle of each joint spring in rad, continued without jumps, valid at the last converged state
     pub angles: Vec<f64>,
+    /// Contacts at the last converged state
+    pub contacts: ContactMemory,
     /// For each rotation slot the base of the current time step, during the iterations of a step
     /// whose unknowns are increments: `q` is then the increment, `v` and `a` the material spin and
     /// its rate. Otherwise empty: rotation vectors are total.
@@ -105,6 +108,7 @@ impl State {
             fading: Arc::default(),
             anchor: None,
             angles: vec![0.0; angles],
+            contacts: ContactMemory::default(),
             turns: Vec::new(),
         }
     }
@@ -125,6 +129,7 @@ impl State {
             fading: self.fading.clone(),
             anchor: self.anchor.clone(),
             angles: self.angles.clone(),
+            contacts: self.contacts.clone(),
             turns: self.turns.clone(),
         }
     }
@@ -185,6 +190,7 @@ impl State {
         self.fading.clone_from(&other.fading);
         self.anchor.clone_from(&other.anchor);
         self.angles.copy_from_slice(&other.angles);
+        self.contacts.clone_from(&other.contacts);
         self.turns.clone_from(&other.turns);
     }
 

@@ -37,7 +37,7 @@ impl Composer<'_> {
     }
 
     /// The number of an amplitude that is 1 in these stages and 0 in others.
-    fn switch(&mut self, stages: Option<&Vec<usize>>) -> usize {
+    pub(super) fn switch(&mut self, stages: Option<&Vec<usize>>) -> usize {
         self.out.amplitudes.push(Amplitude::of_switch(stage_set(stages)));
         self.out.amplitudes.len() - 1
     }

@@ -1,6 +1,7 @@
 //! Which effects act: for each table that stands in the deck one effect, and for each the reason.
 
 mod connections;
+mod contacts;
 mod fading;
 mod inertia;
 mod loads;
@@ -138,6 +139,7 @@ pub fn compose(
     let along = composer.line_loads();
     composer.node_loads(along);
     composer.fading_inertia();
+    composer.contacts();
     composer.parts();
     composer.never();
     composer.out

@@ -288,7 +288,7 @@ impl<'a> Search<'a> {
                 let again = || Failure::Limit("the first run of the search ended with `singular`".into());
                 Err(StudyError::Failure(pool.own_failure().unwrap_or_else(again)))
             }
-            Some(FailureKind::Singular | FailureKind::Deck) => Ok(Next::Nothing),
+            Some(FailureKind::Singular | FailureKind::Deck | FailureKind::ContactStart) => Ok(Next::Nothing),
             None if own.finished() => {
                 let scales = self.mesher.sampler.scales(&own.samples);
                 self.mesher.sampler.refuse_nothing(&scales)?;
@@ -303,6 +303,7 @@ impl<'a> Search<'a> {
             Some(
                 FailureKind::MeshTooCoarse
                 | FailureKind::NotConverged
+                | FailureKind::ContactPassed
                 | FailureKind::NonFinite
                 | FailureKind::EnergyGrowth
                 | FailureKind::Limit

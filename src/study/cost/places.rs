@@ -59,7 +59,7 @@ fn is_node(spot: &Spot, count: usize, order: usize) -> bool {
         (x - x.round()).abs() < AT_NODE
     };
     match spot.graded {
-        Some(own) if count % own != 0 => is_end_of_one(count),
+        Some(own) if !count.is_multiple_of(own) => is_end_of_one(count),
         Some(_) | None => is_end_of_one(count * order),
     }
 }

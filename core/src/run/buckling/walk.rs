@@ -54,7 +54,7 @@ pub fn continue_path(stage: &mut StageRun, target: f64) -> Result<Walked, Failur
             stage.state.copy_from(stage.good);
             return Ok(Walked::TooCoarse);
         }
-        stage.model.remember(stage.state);
+        stage.remember();
         stage.good.copy_from(stage.state);
         done = next;
         part *= if moved < 0.5 * STRIDE { 2.0 } else { 1.0 };

@@ -24,6 +24,8 @@ const STANDING_STILL: f64 = 1e-6;
 const PROPOSED_ERROR: f64 = 0.4;
 /// The least part of a step that is proposed where another scheme does with the step as it is.
 const LEAST_PART_OF_STEP: f64 = 0.1;
+/// Steps that a contact should last: with ten the rebound is within 0.4 %.
+const LEAST_STEPS_OF_CONTACT: u32 = 9;
 
 impl Dynamics<'_, '_> {
     /// An account that time steps do not close, or found open.
@@ -54,6 +56,32 @@ impl Dynamics<'_, '_> {
                  resolve part of the motion (use a smaller `step`, or a scheme with numerical dissipation)"
             );
             self.stage.warn(WarningKind::EnergyGain, message);
+        }
+    }
+
+    /// Contacts whose penalty is too soft, or too stiff for the steps.
+    pub(super) fn warn_of_contacts(&mut self) {
+        if self.stage.model.contacts().is_none() {
+            return;
+        }
+        let stage = self.stage.number + 1;
+        let deepest = self.stage.state.contacts.deepest;
+        if deepest > 1.0 {
+            // Penetrations of an impact fall with the root of the stiffness.
+            let message = format!(
+                "stage {stage}: contacts penetrate by up to {deepest:.3} times `penetration`: a `stiffness` {:.3} times \
+                 as large, with a `step` {:.3} times as long, would keep it",
+                deepest * deepest,
+                1.0 / deepest
+            );
+            self.stage.warn(WarningKind::ContactPenetration, message);
+        }
+        if let Some(steps @ ..LEAST_STEPS_OF_CONTACT) = self.stage.state.contacts.shortest {
+            let message = format!(
+                "stage {stage}: a contact lasted {steps} step(s): its rebound depends on the phase of the steps (take a \
+                 smaller `step`, or a smaller `stiffness` of the contact)"
+            );
+            self.stage.warn(WarningKind::ShortContact, message);
         }
     }
 

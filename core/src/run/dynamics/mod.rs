@@ -92,6 +92,7 @@ impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
 
     fn judge(&mut self) {
         self.warn_of_imbalance();
+        self.warn_of_contacts();
         self.judge_steps();
     }
 }
@@ -305,6 +306,7 @@ impl Dynamics<'_, '_> {
         self.settle_rates(&step);
         self.refuse_turns(step.length)?;
         self.stage.refuse_leaps()?;
+        self.stage.refuse_passing()?;
         let StageRun { assembly, newton, state, good, .. } = &mut *self.stage;
         newton.end_step(&assembly.system, StepEnds { from: good, to: state }, &step, self.increments.as_ref());
         Ok(())

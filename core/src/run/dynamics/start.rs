@@ -21,6 +21,7 @@ impl Dynamics<'_, '_> {
     pub(super) fn start(&mut self) -> Result<(), Failure> {
         let begins = self.set_in_motion();
         self.set_clock()?;
+        self.stage.refuse_penetration()?;
         self.stage.change_charts(None);
         self.stage.linearise()?;
         let step = self.first_step();

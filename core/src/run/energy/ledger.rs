@@ -20,12 +20,16 @@ pub struct Ledger {
     pub external: f64,
     /// Energy taken by damping so far
     pub damped: f64,
+    /// Energy stored in contacts: in penalties, and in elastic stick
+    pub contact: f64,
+    /// Energy taken by friction and damping of contacts so far
+    pub friction: f64,
 }
 
 impl Ledger {
-    /// kinetic + strain + damped - external: constant in an exact solution.
+    /// kinetic + strain + damped - external, and contact + friction: constant in an exact solution.
     pub fn total(&self) -> f64 {
-        self.kinetic + self.strain + self.damped - self.external
+        (self.kinetic + self.strain + self.damped - self.external) + (self.contact + self.friction)
     }
 }
 
@@ -145,6 +149,10 @@ impl Bookkeeper {
         threads::copy(&mut self.unwrapped, &entry.state.unwrapped);
         let energy = entry.energy();
         (self.ledger.kinetic, self.ledger.strain) = (energy.kinetic, energy.strain);
+        if let Some(contacts) = entry.model.contacts() {
+            self.ledger.contact = contacts.energy(entry.state);
+            self.ledger.friction = entry.state.contacts.dissipated;
+        }
         self.scale = self.scale.max(energy.kinetic + energy.strain).max(self.ledger.external.abs());
     }
 }

@@ -43,7 +43,8 @@ pub(in crate::run) enum Vibrations {
 /// Small vibrations about the state of a stage, in space and with the masses and dampers of the
 /// scene. `signature`: of the tangent as the stage is treated.
 pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signature>) -> Result<Vibrations, Failure> {
-    if stage.is_linear() {
+    // Points that slide have no tangent for small vibrations.
+    if stage.is_linear() || stage.state.contacts.touches() {
         return Ok(Vibrations::Unknown);
     }
     let own = stage.stage().context(stage.number);

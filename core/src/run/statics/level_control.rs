@@ -7,6 +7,7 @@ use super::checkpoint::LevelsCheckpoint;
 use super::levels::{Levels, ReachedBy};
 use super::rest;
 use super::stability::{Stability, conclude, tell_of_points};
+use crate::effect::ContactChange;
 use crate::run::checkpoint::AnalysisCheckpoint;
 use crate::run::failure::Failure;
 use crate::run::plan::Approach;
@@ -64,6 +65,7 @@ impl<'r> Analysis<'r> for LoadLevels<'_, 'r> {
 
     fn judge(&mut self) {
         self.stage.warn_of_standstill();
+        self.stage.warn_of_hidden_penetration();
     }
 }
 
@@ -217,8 +219,17 @@ impl LevelControl<'_, '_> {
         if let Err(failure) = NewtonFailure::unless_interrupted() {
             return StepOutcome::Failed(failure);
         }
-        let StageRun { model, good, state, newton, soft, .. } = &*self.stage;
+        let StageRun { model, good, state, newton, soft, contact_change, .. } = &*self.stage;
         let changes = self.stability.changes_to(signature);
+        match contact_change {
+            ContactChange::Slides => return StepOutcome::Good(signature),
+            // A contact that comes or goes is a kink of the path, unless it goes to another branch.
+            ContactChange::Touches if changes == 0 => return StepOutcome::Good(signature),
+            // Points that touch come and go between iterations, and augmentations push back what the
+            // first correction has pressed in.
+            ContactChange::None if changes == 0 && state.contacts.touches() => return StepOutcome::Good(signature),
+            ContactChange::Touches | ContactChange::None => {}
+        }
         if *soft {
             StepOutcome::Good(signature)
         } else if self.levels.may_have_jumped(model, [good, state], &newton.first, changes) {
@@ -233,11 +244,13 @@ impl LevelControl<'_, '_> {
     fn take_step(&mut self, signature: Option<Signature>) -> Result<(), Failure> {
         self.stage.accept()?;
         let before = std::mem::replace(&mut self.stability.signature, signature);
-        tell_of_points(self.stage, &mut self.space, None, before, signature)?;
+        if self.stage.contact_change == ContactChange::None {
+            tell_of_points(self.stage, &mut self.space, None, before, signature)?;
+        }
         self.stage.good.copy_all_but_rates(self.stage.state);
         self.levels.reached_by = self.levels.reached_by.max(ReachedBy::Levels);
         // Where pivots were looked at the stiffness is that of this state.
-        if signature.is_some() {
+        if signature.is_some() && !self.stage.state.contacts.touches() {
             self.stage.newton.begin_with(&self.stage.assembly.system);
         }
         self.levels.double();

@@ -32,6 +32,11 @@ impl StageRun<'_> {
     /// One attempt at a load factor. Prescribed motions enter with the first correction: they are
     /// taken back out of the state and handed to Newton as increments.
     pub fn attempt(&mut self, load: f64) -> Result<(), NewtonFailure> {
+        if self.model.contacts().is_some() { self.attempt_with_contacts(load) } else { self.attempt_once(load) }
+    }
+
+    /// One solution of Newton's method at a load factor.
+    pub(super) fn attempt_once(&mut self, load: f64) -> Result<(), NewtonFailure> {
         let moves = self.set_load(load)?;
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
         let moved = moves.then_some(&prescribed_increment[..]);

@@ -1,6 +1,7 @@
 //! Static stages: balance at growing loads, by load levels or along a path by arc length.
 
 mod arc_length;
+mod augment;
 pub(super) mod checkpoint;
 mod level_control;
 mod levels;
@@ -31,6 +32,7 @@ const MOST_KEPT_VALUES: usize = 10_000_000;
 /// named: levels may bring what holds it.
 fn begin(stage: &mut StageRun, space: &mut SpatialLook) -> Result<Option<Failure>, Failure> {
     unload(stage);
+    stage.refuse_penetration()?;
     stage.take_over();
     stage.linearise()?;
     let loose = match softest(stage).filter(|soft_mode| !soft_mode.vector.broke_down) {

@@ -1,0 +1,344 @@
+//! A beam or a body against one surface: its nodes, and its candidates for contact.
+//!
+//! The candidates of a state are the closest points between the ends of elements
+//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. Elements from which
+//! the surface is farther than they reach have none: the distance changes by no more than a point
+//! moves.
+
+use crate::kernel::MAX_NODES;
+use crate::kernel::contact::along::weighted_sum;
+use crate::kernel::contact::{Carrier, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
+use crate::system::{ChainMemory, Node, State};
+use crate::tensor::Vec3;
+
+/// The largest distance, in elements, between the places of a contact in two states.
+const LARGEST_SHIFT: f64 = 1.5;
+
+/// The farthest point of an element with equally spaced nodes from any centre, over the farthest
+/// node: the Lebesgue constants of one to four nodes.
+const REACH: [f64; MAX_NODES + 1] = [1.0, 1.0, 1.0, 1.25, 1.64];
+
+/// Gaps below this part of the radius are looked at.
+const MARGIN: f64 = 1e-5;
+
+/// Beams without end caps touch with the rim of their end: the surface is nearest beside the end,
+/// not beyond it, if the cosine between its direction and the beam is below this.
+const CAP_COSINE: f64 = 0.5;
+
+/// A node of a chain.
+#[derive(Clone, Copy, Debug)]
+pub struct ChainNode {
+    /// Its slots
+    pub node: Node,
+    /// Its initial place
+    pub place: Vec3,
+    /// The part of the length of the beam before it
+    pub fraction: f64,
+}
+
+/// Stiffness of contacts of an element.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactStiffness {
+    /// First stiffness of augmentations, force per length
+    pub augmented: f64,
+    /// Stiffness of the penalty in dynamic stages, force per length
+    pub penalty: f64,
+}
+
+/// A beam or a body against one surface.
+#[derive(Clone, Debug)]
+pub struct Chain {
+    /// Number of the contact that it belongs to
+    pub contact: usize,
+    /// Number of the surface
+    pub surface: usize,
+    /// Number of the beam in the scene; `None` for a body
+    pub beam: Option<usize>,
+    /// Radius of the section, or of the sphere of a body
+    pub radius: f64,
+    /// Length of the beam; zero for a body
+    pub length: f64,
+    /// The nodes in their order; one for a body
+    pub nodes: Vec<ChainNode>,
+    /// Nodes of an element less one; zero for a body
+    pub order: usize,
+    /// Stiffness by element
+    pub stiffness: Vec<ContactStiffness>,
+    /// True if the ends are half spheres, false if they do not touch
+    pub has_caps: bool,
+}
+
+/// A point that may touch the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    /// Number of the element in the chain
+    pub element: usize,
+    /// Place on the element, from 0 to 1
+    pub s: f64,
+    /// At a node, or at the closest point
+    pub place: Place,
+}
+
+impl Candidate {
+    /// Its place in the chain, counted in elements.
+    pub fn along(&self) -> f64 {
+        self.element as f64 + self.s
+    }
+}
+
+/// The nodes of a chain as a surface sees them.
+struct SeenChain<'a> {
+    chain: &'a Chain,
+    surface: &'a Surface,
+    /// Places of the nodes in the coordinates of the surface
+    places: Vec<Vec3>,
+    /// A ball without contact: its centre and its radius
+    free: (Vec3, f64),
+}
+
+impl Chain {
+    /// The number of elements; one for a body.
+    pub fn elements(&self) -> usize {
+        self.stiffness.len()
+    }
+
+    /// Nodes of element `k`.
+    pub fn nodes_of(&self, k: usize) -> &[ChainNode] {
+        &self.nodes[k * self.order..=(k + 1) * self.order]
+    }
+
+    /// The part of the length of the beam before a candidate.
+    pub(super) fn fraction(&self, at: &Candidate) -> f64 {
+        let nodes = self.nodes_of(at.element);
+        let [from, to] = [nodes[0].fraction, nodes[nodes.len() - 1].fraction];
+        from + (to - from) * at.s
+    }
+
+    /// The length of the beam that a point at a place carries the force of: its element, or half of
+    /// the way to both neighbours of a node.
+    pub(super) fn share(&self, along: f64) -> f64 {
+        if self.order == 0 {
+            return 0.0;
+        }
+        let last = self.nodes.len() - 1;
+        let at = along * self.order as f64;
+        let (from, to) = if at.fract() == 0.0 {
+            let node = at as usize;
+            (node.saturating_sub(1), (node + 1).min(last))
+        } else {
+            let element = (along as usize).min(self.elements() - 1);
+            (element * self.order, (element + 1) * self.order)
+        };
+        let width = self.length * (self.nodes[to].fraction - self.nodes[from].fraction);
+        if at.fract() == 0.0 { 0.5 * width } else { width }
+    }
+
+    /// The place in elements at a part of the length of the beam.
+    pub(super) fn along(&self, fraction: f64) -> f64 {
+        let next = self.nodes.partition_point(|node| node.fraction < fraction).clamp(1, self.nodes.len() - 1);
+        let [from, to] = [self.nodes[next - 1].fraction, self.nodes[next].fraction];
+        (next as f64 - 1.0 + (fraction - from) / (to - from)) / self.order as f64
+    }
+
+    /// The least gap of nodes and closest points; infinite where the surface has no normal.
+    pub(super) fn least_gap(&self, surface: &Surface, carrier: &Carrier, at: &State) -> f64 {
+        let places = self.seen(carrier, at);
+        let gap = |place: Vec3| surface.distance(place).map_or(f64::INFINITY, |d| d.value - self.radius);
+        let nodes = places.iter().map(|place| gap(*place)).fold(f64::INFINITY, f64::min);
+        let seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0) };
+        let elements = 0..if self.order == 0 { 0 } else { self.elements() };
+        elements.flat_map(|k| seen.closest(k)).map(gap).fold(nodes, f64::min)
+    }
+
+    /// Places of the nodes in the coordinates of a surface.
+    pub(super) fn seen(&self, carrier: &Carrier, at: &State) -> Vec<Vec3> {
+        let place = |node: &ChainNode| node.place + at.q[node.node.u as usize];
+        self.nodes.iter().map(|node| carrier.on_surface(place(node))).collect()
+    }
+
+    /// The candidates of a state, in the order of the chain.
+    pub(super) fn candidates(
+        &self,
+        surface: &Surface,
+        carrier: &Carrier,
+        memory: Option<&ChainMemory>,
+        at: &State,
+    ) -> Vec<Candidate> {
+        if memory.is_none_or(|memory| memory.points.is_empty()) && self.is_far(surface, carrier, at) {
+            return Vec::new();
+        }
+        let places = self.seen(carrier, at);
+        let mut seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0) };
+        seen.candidates(memory)
+    }
+
+    /// True if the surface is farther from the middle node than the chain reaches.
+    fn is_far(&self, surface: &Surface, carrier: &Carrier, at: &State) -> bool {
+        let place = |node: &ChainNode| node.place + at.q[node.node.u as usize];
+        let middle = place(&self.nodes[self.nodes.len() / 2]);
+        let Ok(distance) = surface.distance(carrier.on_surface(middle)) else { return false };
+        let gap = distance.value - self.radius * (1.0 + MARGIN);
+        let square = self.nodes.iter().map(|node| (place(node) - middle).squared()).fold(0.0, f64::max);
+        gap > 0.0 && REACH[self.order + 1] * square.sqrt() < gap
+    }
+
+    /// The number of the last point in memory of each candidate: the nearest ones first, each once.
+    pub(super) fn matched(&self, candidates: &[Candidate], memory: Option<&ChainMemory>) -> Vec<Option<usize>> {
+        let mut partner = vec![None; candidates.len()];
+        let Some(memory) = memory else { return partner };
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        let mut first = 0;
+        for (k, candidate) in candidates.iter().enumerate() {
+            let along = candidate.along();
+            while first < memory.points.len() && memory.points[first].place < along - LARGEST_SHIFT {
+                first += 1;
+            }
+            let near = memory.points[first..].iter().take_while(|point| point.place <= along + LARGEST_SHIFT);
+            pairs.extend(near.enumerate().map(|(j, point)| ((point.place - along).abs(), k, first + j)));
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        let mut taken = vec![false; memory.points.len()];
+        for (_, k, j) in pairs {
+            if partner[k].is_none() && !taken[j] {
+                partner[k] = Some(j);
+                taken[j] = true;
+            }
+        }
+        partner
+    }
+}
+
+impl SeenChain<'_> {
+    fn candidates(&mut self, memory: Option<&ChainMemory>) -> Vec<Candidate> {
+        let count = self.chain.elements();
+        let mut is_near = vec![false; count];
+        for k in self.remembered(memory) {
+            is_near[k] = true;
+        }
+        let mut candidates = Vec::new();
+        let mut has_minimum = vec![false; count];
+        for k in 0..count {
+            is_near[k] = is_near[k] || !self.is_free(k);
+            if is_near[k] {
+                has_minimum[k] = self.add_minima(k, &mut candidates);
+            }
+        }
+        self.add_nodes(&is_near, &has_minimum, &mut candidates);
+        candidates.sort_by(|a, b| a.along().total_cmp(&b.along()));
+        candidates
+    }
+
+    /// The elements beside points that had a force.
+    fn remembered(&self, memory: Option<&ChainMemory>) -> Vec<usize> {
+        let last = self.chain.elements() as f64 - 1.0;
+        let points = memory.map_or(&[][..], |memory| &memory.points);
+        let beside = |place: f64| {
+            let [from, to] = [-LARGEST_SHIFT, LARGEST_SHIFT].map(|d| (place + d).floor().clamp(0.0, last) as usize);
+            from..=to
+        };
+        points.iter().flat_map(|point| beside(point.place)).collect()
+    }
+
+    fn places_of(&self, k: usize) -> &[Vec3] {
+        let order = self.chain.order;
+        &self.places[k * order..=(k + 1) * order]
+    }
+
+    /// True if no point of element `k` touches the surface.
+    fn is_free(&mut self, k: usize) -> bool {
+        let places = self.places_of(k);
+        let factor = REACH[places.len()];
+        let farthest = |centre: Vec3| places.iter().map(|place| (*place - centre).norm()).fold(0.0, f64::max);
+        let (centre, radius) = self.free;
+        if radius > 0.0 && factor * farthest(centre) < radius {
+            return true;
+        }
+        let middle = places.iter().fold(Vec3::ZERO, |sum, place| sum + *place) * (1.0 / places.len() as f64);
+        let Ok(distance) = self.surface.distance(middle) else { return false };
+        // Nearer ones may touch but for round-off.
+        let gap = distance.value - self.chain.radius * (1.0 + MARGIN);
+        let is_free = factor * farthest(middle) < gap;
+        self.free = (middle, gap);
+        is_free
+    }
+
+    fn minima(&self, k: usize) -> Minima {
+        let distance = |y: Vec3| self.surface.distance(y).ok();
+        match self.places_of(k) {
+            [a, b] => minima(&[*a, *b], &distance),
+            [a, b, c] => minima(&[*a, *b, *c], &distance),
+            [a, b, c, d] => minima(&[*a, *b, *c, *d], &distance),
+            _ => Minima::default(),
+        }
+    }
+
+    /// The places of all closest points between the ends of element `k`.
+    fn closest(&self, k: usize) -> Vec<Vec3> {
+        let places = self.places_of(k);
+        let found = self.minima(k);
+        let place = |s: f64| match places {
+            [a, b] => weighted_sum(&ShapeAt::<2>::new(s).values, |i| [*a, *b][i]),
+            [a, b, c] => weighted_sum(&ShapeAt::<3>::new(s).values, |i| [*a, *b, *c][i]),
+            [a, b, c, d, ..] => weighted_sum(&ShapeAt::<4>::new(s).values, |i| [*a, *b, *c, *d][i]),
+            [a] => *a,
+            [] => Vec3::ZERO,
+        };
+        found.found().iter().map(|minimum| place(minimum.s)).collect()
+    }
+
+    /// Adds the closest points between the ends of element `k`; true if some of them carry the
+    /// force of the element. The edge of a body that has come inside the section pushes it out, too,
+    /// from the place where it is.
+    fn add_minima(&self, k: usize, candidates: &mut Vec<Candidate>) -> bool {
+        let mut is_sharp = false;
+        for &Minimum { s, kind } in self.minima(k).found() {
+            let place = match kind {
+                MinimumKind::Sharp => Place::Closest,
+                MinimumKind::Kink if self.surface.side == Side::Outside => Place::Fixed,
+                MinimumKind::Kink | MinimumKind::Conforming => continue,
+            };
+            is_sharp |= place == Place::Closest;
+            candidates.push(Candidate { element: k, s, place });
+        }
+        is_sharp
+    }
+
+    /// Adds the nodes of near elements that are not beside a closest point.
+    fn add_nodes(&self, is_near: &[bool], has_minimum: &[bool], candidates: &mut Vec<Candidate>) {
+        let order = self.chain.order;
+        let last = self.places.len() - 1;
+        for k in 0..=last {
+            // A body alone has no elements, and counts as one.
+            let from = k.saturating_sub(1).checked_div(order).unwrap_or(0);
+            let to = k.checked_div(order).map_or(0, |element| element.min(is_near.len() - 1));
+            let beside = from..=to;
+            let is_candidate = beside.clone().any(|e| is_near[e]) && !beside.clone().any(|e| has_minimum[e]);
+            if !is_candidate || (order > 0 && !self.chain.has_caps && self.is_cap(k)) {
+                continue;
+            }
+            let s = if order == 0 { 0.0 } else { (k - to * order) as f64 / order as f64 };
+            candidates.push(Candidate { element: to, s, place: Place::Fixed });
+        }
+    }
+
+    /// True if node `k` is an end of the chain that faces the surface.
+    fn is_cap(&self, k: usize) -> bool {
+        let last = self.places.len() - 1;
+        let outward = if k == 0 {
+            self.places[0] - self.places[1]
+        } else if k == last {
+            self.places[last] - self.places[last - 1]
+        } else {
+            return false;
+        };
+        let (Some(outward), Ok(distance)) = (outward.normalized(), self.surface.distance(self.places[k])) else {
+            return false;
+        };
+        -distance.normal.dot(outward) > CAP_COSINE
+    }
+}
+
+/// Shape functions of N nodes at a candidate: at a node exactly those of the node.
+pub(super) fn shape<const N: usize>(at: &Candidate) -> ShapeAt<N> {
+    ShapeAt::new(at.s)
+}

@@ -1,0 +1,688 @@
+//! Contact of beams and bodies with rigid surfaces.
+//!
+//! Forces and tangents are those of [`crate::kernel::contact`]. This effect finds the points, gives
+//! them the multipliers and tractions of the memory in the state, and writes that memory when a
+//! state is accepted.
+
+mod chain;
+mod resultant;
+mod surface;
+
+pub use chain::{Chain, ChainNode, ContactStiffness};
+pub use surface::{SceneSurface, SurfaceCarrier};
+
+use super::{
+    ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, Penetration, Roles,
+    TangentForm,
+};
+use crate::kernel::contact::{
+    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Status,
+    add_point,
+};
+use crate::kernel::{ElementSystem, Weights};
+use crate::rotation::Rotation;
+use crate::system::{
+    Assembler, Category, ChainMemory, Connectivity, ContactRegime, Memory, MirrorData, PointMemory, Slot, State,
+};
+use crate::tensor::{Mat3, Vec3};
+use chain::{Candidate, shape};
+use std::sync::Arc;
+
+/// The gap up to which a point without a force counts as touching, over the largest penetration.
+const TOUCHING: f64 = 1e-4;
+
+/// Factor of the first stiffness of points that are held in modal stages: about that of elements.
+const HELD: f64 = 1e4;
+
+/// Penetrations that are told exceed the allowed one by this factor.
+const ROUNDED: f64 = 1.01;
+
+/// Forces below this part of the largest need no small gap.
+const RELEVANT_FORCE: f64 = 1e-6;
+
+/// The laws of a contact.
+#[derive(Clone, Debug)]
+pub struct ContactLaws {
+    /// Its name
+    pub name: String,
+    /// Coefficients of friction at the start and at the end of beams
+    pub friction: [f64; 2],
+    /// Tangential over normal stiffness
+    pub stick: f64,
+    /// The largest penetration, a length
+    pub penetration: f64,
+    /// c of the penalty, time per length
+    pub damping: f64,
+    /// The index of its amplitude, which is 0 in stages without it and otherwise 1
+    pub amplitude: usize,
+}
+
+impl ContactLaws {
+    /// True if it has friction.
+    pub fn rubs(&self) -> bool {
+        self.friction != [0.0; 2]
+    }
+}
+
+/// All contacts with rigid surfaces.
+#[derive(Clone, Debug, Default)]
+pub struct SurfaceContacts {
+    /// The contacts
+    pub laws: Vec<ContactLaws>,
+    /// The surfaces
+    pub surfaces: Vec<SceneSurface>,
+    /// Beams and bodies, each against one surface
+    pub chains: Vec<Chain>,
+}
+
+/// A chain in a state.
+struct ChainNow<'a> {
+    chain: &'a Chain,
+    laws: &'a ContactLaws,
+    surface: &'a SceneSurface,
+    carrier: Carrier,
+    memory: Option<&'a ChainMemory>,
+    at: &'a State,
+    candidates: Vec<Candidate>,
+    /// Numbers of the points in memory that the candidates were
+    partners: Vec<Option<usize>>,
+}
+
+/// A point in a state.
+struct PointNow<'a> {
+    candidate: &'a Candidate,
+    /// Number of the point that it was, and its memory
+    number: Option<usize>,
+    partner: Option<&'a PointMemory>,
+    law: ContactLaw,
+    state: PointState,
+}
+
+impl SurfaceContacts {
+    /// Visits the chains whose contact acts in a state.
+    fn each_chain<'a>(&'a self, at: &'a State, weights: Weights, visit: &mut dyn FnMut(usize, &ChainNow<'a>)) {
+        for (number, chain) in self.chains.iter().enumerate() {
+            if at.amplitude[self.laws[chain.contact].amplitude] != 0.0 {
+                visit(number, &self.chain_now(number, at, weights));
+            }
+        }
+    }
+
+    fn chain_now<'a>(&'a self, number: usize, at: &'a State, weights: Weights) -> ChainNow<'a> {
+        let chain = &self.chains[number];
+        let surface = &self.surfaces[chain.surface];
+        let carrier = surface.carrier(at, weights);
+        let memory = at.contacts.chains.get(number);
+        let candidates = chain.candidates(&surface.surface, &carrier, memory, at);
+        let partners = chain.matched(&candidates, memory);
+        ChainNow { chain, laws: &self.laws[chain.contact], surface, carrier, memory, at, candidates, partners }
+    }
+
+    /// The number of the first instance of each chain.
+    fn first_instances(&self) -> Vec<usize> {
+        let mut next = 0;
+        let first = |chain: &Chain| {
+            let own = next;
+            next += chain.elements();
+            own
+        };
+        self.chains.iter().map(first).collect()
+    }
+
+    /// Writes a new memory of all chains.
+    fn remember(&self, at: &mut State, accepts: bool) -> f64 {
+        let mut chains = vec![ChainMemory::default(); self.chains.len()];
+        let mut dissipated = 0.0;
+        for (number, chain) in self.chains.iter().enumerate() {
+            let laws = &self.laws[chain.contact];
+            let old = at.contacts.chains.get(number);
+            let new = &mut chains[number];
+            if accepts && laws.rubs() {
+                let carrier = self.surfaces[chain.surface].carrier(at, Weights::NONE);
+                new.nodes = chain.nodes.iter().map(|node| before_of(node, &carrier, at)).collect();
+            } else if let Some(old) = old {
+                new.nodes.clone_from(&old.nodes);
+            }
+            if at.amplitude[laws.amplitude] == 0.0 {
+                continue;
+            }
+            let now = self.chain_now(number, at, Weights::NONE);
+            now.each_point(Weights::NONE, &mut |point, _| {
+                if point.state.normal_force.force > 0.0 {
+                    new.points.push(now.memory_of(point, accepts));
+                    dissipated += point.dissipated();
+                }
+            });
+        }
+        at.contacts.chains = Arc::new(chains);
+        dissipated
+    }
+
+    /// The length of beams with a force, or without one between points that have some, as where a
+    /// beam lies flat.
+    fn length_in_contact(&self, number: usize, at: &State) -> f64 {
+        let mut length = 0.0;
+        self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            if chain.chain.contact != number {
+                return;
+            }
+            // Length without force since the last point with one, if all of it is near.
+            let mut between: Option<f64> = None;
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                let share = chain.chain.share(point.candidate.along());
+                if point.partner.is_some() {
+                    length += share + between.unwrap_or_default();
+                    between = Some(0.0);
+                } else if point.state.gap <= chain.laws.penetration {
+                    between = between.map(|length| length + share);
+                } else {
+                    between = None;
+                }
+            });
+        });
+        length
+    }
+
+    /// Changes the memory of all points with a force; shows them with the stiffness of their element.
+    fn change_points(&self, at: &mut State, change: impl Fn(&mut PointMemory, &ContactStiffness)) {
+        let mut chains = (*at.contacts.chains).clone();
+        for (chain, memory) in self.chains.iter().zip(&mut chains) {
+            for point in &mut memory.points {
+                let element = (point.place as usize).min(chain.elements() - 1);
+                change(point, &chain.stiffness[element]);
+            }
+        }
+        at.contacts.chains = Arc::new(chains);
+    }
+
+    /// Notes the deepest penetration and the shortest contact of a time step.
+    fn judge_penalty(&self, at: &mut State) {
+        let mut deepest = 0.0f64;
+        let mut shortest: Option<u32> = None;
+        self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            let mut stays = vec![false; chain.memory.map_or(0, |memory| memory.points.len())];
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                let offset = point.law.radius - chain.chain.radius;
+                deepest = deepest.max(-(point.state.gap + offset) / chain.laws.penetration);
+                if let (Some(number), true) = (point.number, point.state.normal_force.force > 0.0) {
+                    stays[number] = true;
+                }
+            });
+            let points = chain.memory.map_or(&[][..], |memory| &memory.points);
+            let ended = points.iter().zip(&stays).filter(|(_, stays)| !**stays).map(|(point, _)| point.steps);
+            shortest = shortest.into_iter().chain(ended.filter(|&steps| steps > 0)).min();
+        });
+        let contacts = &mut at.contacts;
+        contacts.deepest = contacts.deepest.max(deepest);
+        contacts.shortest = contacts.shortest.into_iter().chain(shortest).min();
+    }
+
+    fn damping_power(&self, at: &State) -> f64 {
+        let mut power = 0.0;
+        if at.contacts.regime == ContactRegime::Penalty && self.laws.iter().any(|laws| laws.damping != 0.0) {
+            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+                chain.each_point(Weights::NONE, &mut |point, _| power += chain.damping_power(point));
+            });
+        }
+        power
+    }
+}
+
+/// Places, followed by the middles between each two neighbours.
+fn with_middles(mut places: Vec<Vec3>) -> Vec<Vec3> {
+    let middles: Vec<Vec3> = places.windows(2).map(|pair| (pair[0] + pair[1]) * 0.5).collect();
+    places.extend(middles);
+    places
+}
+
+fn before_of(node: &ChainNode, carrier: &Carrier, at: &State) -> NodeBefore {
+    let place = node.place + at.q[node.node.u as usize];
+    NodeBefore::of(place, at.rotation(node.node.p).r, carrier.place, &carrier.rotation.r)
+}
+
+impl<'a> ChainNow<'a> {
+    /// Visits all candidates with their forces, and the system of the element of each.
+    fn each_point(&self, weights: Weights, visit: &mut dyn FnMut(&PointNow, &ElementSystem)) {
+        if self.candidates.is_empty() {
+            return;
+        }
+        let blocks = 2 * (self.chain.order + 1) + if self.carrier.is_node { 2 } else { 0 };
+        let mut system = ElementSystem::new(blocks);
+        for (candidate, &number) in self.candidates.iter().zip(&self.partners) {
+            let partner = number.and_then(|number| self.memory?.points.get(number));
+            let law = self.law(candidate, partner);
+            system.clear_for(weights);
+            let state = match self.chain.order {
+                0 => self.add::<1>(candidate, &law, weights, &mut system),
+                1 => self.add::<2>(candidate, &law, weights, &mut system),
+                2 => self.add::<3>(candidate, &law, weights, &mut system),
+                _ => self.add::<4>(candidate, &law, weights, &mut system),
+            };
+            let Some(state) = state else { continue };
+            visit(&PointNow { candidate, number, partner, law, state }, &system);
+        }
+    }
+
+    /// Adds forces and tangent of a candidate; `None` where the surface has no normal.
+    fn add<const N: usize>(
+        &self,
+        candidate: &Candidate,
+        law: &ContactLaw,
+        weights: Weights,
+        out: &mut ElementSystem,
+    ) -> Option<PointState> {
+        let shape = shape::<N>(candidate);
+        let nodes = self.chain.nodes_of(candidate.element);
+        let first = candidate.element * self.chain.order;
+        let nodes: [ContactNode; N] = std::array::from_fn(|i| self.node(&nodes[i], first + i, law.friction.is_some()));
+        let place = (0..N).fold(Vec3::ZERO, |sum, i| sum + nodes[i].place * shape.values[i]);
+        let distance = self.surface.surface.distance(self.carrier.on_surface(place)).ok()?;
+        Some(add_point(&nodes, &shape, &self.carrier, &distance, law, weights, out))
+    }
+
+    fn node(&self, node: &ChainNode, number: usize, rubs: bool) -> ContactNode {
+        let place = node.place + self.at.q[node.node.u as usize];
+        let velocity = self.at.v[node.node.u as usize];
+        if !rubs {
+            let before = NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY };
+            return ContactNode { place, velocity, rotation: Rotation::new(Vec3::ZERO), before };
+        }
+        let known = self.memory.and_then(|memory| memory.nodes.get(number));
+        let before = known.copied().unwrap_or_else(|| self.initial(node));
+        ContactNode { place, velocity, rotation: self.at.rotation(node.node.p), before }
+    }
+
+    /// A node as the surface saw it at the start of the run.
+    fn initial(&self, node: &ChainNode) -> NodeBefore {
+        let carrier = match self.surface.carrier {
+            SurfaceCarrier::Node { place, .. } | SurfaceCarrier::Turn { about: place, .. } => place,
+            SurfaceCarrier::Ground | SurfaceCarrier::Shift { .. } => Vec3::ZERO,
+        };
+        NodeBefore { place: node.place - carrier, rotation: Mat3::IDENTITY }
+    }
+
+    fn law(&self, candidate: &Candidate, partner: Option<&PointMemory>) -> ContactLaw {
+        let contacts = &self.at.contacts;
+        let stiffness = self.chain.stiffness[candidate.element];
+        let (normal, first) = match contacts.regime {
+            ContactRegime::Augmented => {
+                let normal = NormalLaw::Augmented {
+                    multiplier: partner.map_or(0.0, |point| point.multiplier),
+                    stiffness: stiffness.augmented * contacts.factor,
+                    touching: TOUCHING * self.laws.penetration,
+                };
+                (normal, stiffness.augmented * contacts.first_factor)
+            }
+            ContactRegime::Penalty => {
+                let normal = NormalLaw::Penalty { stiffness: stiffness.penalty, damping: self.laws.damping, toe: 0.0 };
+                (normal, stiffness.penalty)
+            }
+        };
+        let [start, end] = self.laws.friction;
+        let coefficient = start + (end - start) * self.chain.fraction(candidate);
+        let friction = (coefficient > 0.0).then_some(FrictionLaw { coefficient, stiffness: self.laws.stick * first });
+        let carried = partner.map_or(CarriedTraction::default(), |point| CarriedTraction {
+            force: point.traction,
+            normal: point.normal,
+            slides: point.slides && contacts.goes_on,
+        });
+        let is_penalty = contacts.regime == ContactRegime::Penalty;
+        let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.offset);
+        ContactLaw { radius: self.chain.radius + offset, normal, friction, carried, place: candidate.place }
+    }
+
+    /// The memory of a point with a force. Before a state is accepted, traction and normal remain
+    /// those of the last one.
+    fn memory_of(&self, point: &PointNow, accepts: bool) -> PointMemory {
+        let PointNow { candidate, state, law, .. } = point;
+        let slides = state.status() == Status::Slides;
+        let rotation = &self.carrier.rotation.r;
+        let carried = if accepts {
+            CarriedTraction { force: state.traction.force, normal: state.normal, slides }
+        } else {
+            law.carried
+        };
+        let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
+        let gap = state.gap + law.radius - self.chain.radius;
+        let force = state.normal_force.force;
+        // Stages go on with the first stiffness.
+        let first = self.chain.stiffness[candidate.element].augmented * self.at.contacts.first_factor;
+        let multiplier = if accepts { force + first * gap } else { force };
+        let is_penalty = self.at.contacts.regime == ContactRegime::Penalty;
+        let before = point.partner.filter(|_| is_penalty);
+        PointMemory {
+            place: candidate.along(),
+            force,
+            multiplier,
+            gap,
+            traction: carried.force,
+            normal: carried.normal,
+            slides: carried.slides,
+            offset: before.map_or(0.0, |before| before.offset),
+            steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
+            push: *rotation * state.force(),
+            at: contact,
+        }
+    }
+
+    /// The place of a candidate (global components).
+    fn place(&self, candidate: &Candidate) -> Vec3 {
+        let nodes = self.chain.nodes_of(candidate.element);
+        let places: Vec<Vec3> = nodes.iter().map(|node| node.place + self.at.q[node.node.u as usize]).collect();
+        match &places[..] {
+            [a] => *a,
+            [a, b] => sum(&shape::<2>(candidate).values, &[*a, *b]),
+            [a, b, c] => sum(&shape::<3>(candidate).values, &[*a, *b, *c]),
+            [a, b, c, d, ..] => sum(&shape::<4>(candidate).values, &[*a, *b, *c, *d]),
+            [] => Vec3::ZERO,
+        }
+    }
+
+    /// Energy per time that the damping of a point takes: p_el c (dg/dt)^2.
+    fn damping_power(&self, point: &PointNow) -> f64 {
+        let NormalLaw::Penalty { stiffness, damping, .. } = point.law.normal else { return 0.0 };
+        let elastic = stiffness * (-point.state.gap).max(0.0);
+        let force = point.state.normal_force.force;
+        if elastic == 0.0 || damping == 0.0 {
+            return 0.0;
+        }
+        // force = elastic (1 - c rate) where it is positive.
+        let rate = (1.0 - force / elastic) / damping;
+        (elastic - force) * rate
+    }
+
+    fn slot_of(&self, candidate: &Candidate) -> Slot {
+        let nodes = self.chain.nodes_of(candidate.element);
+        let nearest = (candidate.s * self.chain.order as f64).round() as usize;
+        nodes[nearest.min(nodes.len() - 1)].node.u
+    }
+}
+
+fn sum<const N: usize>(factors: &[f64; N], places: &[Vec3; N]) -> Vec3 {
+    factors.iter().zip(places).fold(Vec3::ZERO, |sum, (factor, place)| sum + *place * *factor)
+}
+
+impl PointNow<'_> {
+    /// Energy that friction has taken since the last converged state: the work of the mean traction
+    /// over the sliding, less what elastic stick has stored.
+    fn dissipated(&self) -> f64 {
+        let Some(friction) = self.law.friction else { return 0.0 };
+        let traction = &self.state.traction;
+        let before = self.law.carried.carried_to(self.state.normal);
+        let mean = (traction.force + before) * 0.5;
+        -mean.dot(traction.sliding) - friction.energy(traction.force) + friction.energy(before)
+    }
+
+    /// The stored energy.
+    fn energy(&self) -> f64 {
+        let stick = self.law.friction.map_or(0.0, |friction| friction.energy(self.state.traction.force));
+        self.law.normal.energy(self.state.gap) + stick
+    }
+}
+
+impl Effect for SurfaceContacts {
+    fn name(&self) -> &'static str {
+        "contact with surfaces"
+    }
+
+    fn category(&self) -> Category {
+        Category::Internal
+    }
+
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
+        for chain in &self.chains {
+            let carrier = self.surfaces[chain.surface].slots();
+            for k in 0..chain.elements() {
+                let nodes = chain.nodes_of(k).iter().flat_map(|node| [node.node.u, node.node.p]);
+                connectivity.push(nodes.chain(carrier.into_iter().flatten()));
+            }
+        }
+        connectivity
+    }
+
+    fn tangent(&self) -> TangentForm {
+        let damps = |laws: &ContactLaws| laws.damping != 0.0;
+        TangentForm::symmetric(!self.laws.iter().any(|laws| laws.rubs() || damps(laws)))
+    }
+
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        for chain in &self.chains {
+            self.surfaces[chain.surface].mirror_data(chain.nodes[0].place, show);
+            chain.nodes.iter().filter(|_| chain.beam.is_none()).for_each(|node| show(MirrorData::Place(node.place)));
+        }
+    }
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
+        let first = self.first_instances();
+        self.each_chain(at, weights, &mut |number, chain| {
+            chain.each_point(weights, &mut |point, system| {
+                if point.state.status() != Status::Open {
+                    out.add(first[number] + point.candidate.element, system);
+                }
+            });
+        });
+    }
+
+    fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let mut largest = 0.0f64;
+        self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                if point.state.status() == Status::Open {
+                    return;
+                }
+                let nodes = chain.chain.nodes_of(point.candidate.element);
+                let nearest = (point.candidate.s * chain.chain.order as f64).round() as usize;
+                let moved = field[nodes[nearest.min(nodes.len() - 1)].node.u as usize];
+                let carried = chain.surface.slots().map_or(Vec3::ZERO, |[u, _]| field[u as usize]);
+                let seen = chain.carrier.rotation.r.transpose_mul(moved - carried);
+                let sticks = point.state.status() == Status::Sticks;
+                let strain = if sticks { seen.norm() } else { seen.dot(point.state.normal).abs() };
+                largest = largest.max(strain / length);
+            });
+        });
+        largest
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        let is_driven = |surface: &SceneSurface| {
+            matches!(surface.carrier, SurfaceCarrier::Shift { .. } | SurfaceCarrier::Turn { .. })
+        };
+        let driven: Option<&dyn DrivenCoordinates> =
+            if self.surfaces.iter().any(is_driven) { Some(self) } else { None };
+        Roles { contacts: Some(self), driven, ..Roles::NONE }
+    }
+}
+
+impl DrivenCoordinates for SurfaceContacts {
+    fn drives(&self, at: &State, _origin: Option<&State>, show: &mut dyn FnMut(f64, f64)) {
+        for (number, chain) in self.chains.iter().enumerate() {
+            let surface = &self.surfaces[chain.surface];
+            let Some((amplitude, _)) = surface.driven(at, Vec3::ZERO, Vec3::ZERO) else { continue };
+            let points = at.contacts.chains.get(number).map_or(&[][..], |memory| &memory.points);
+            let of_point = |point: &PointMemory| surface.driven(at, point.push, point.at).map_or(0.0, |(_, f)| f);
+            show(amplitude, points.iter().map(of_point).sum());
+        }
+    }
+}
+
+impl Contacts for SurfaceContacts {
+    fn survey(&self, at: &State) -> ContactSurvey {
+        let mut out = ContactSurvey::default();
+        let mut largest_force = 0.0f64;
+        self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                largest_force = largest_force.max(point.state.normal_force.force);
+            });
+        });
+        self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                let force = point.state.normal_force.force;
+                let gap = point.state.gap;
+                out.points += usize::from(force > 0.0);
+                let is_relevant = gap < 0.0 || force > RELEVANT_FORCE * largest_force;
+                let violation = gap.abs() / chain.laws.penetration;
+                if is_relevant && violation > out.violation {
+                    out.violation = violation;
+                    out.gap = gap;
+                    out.slot = chain.slot_of(point.candidate);
+                }
+            });
+        });
+        out
+    }
+
+    fn augment(&self, at: &mut State) {
+        self.remember(at, false);
+    }
+
+    fn hold(&self, at: &mut State) {
+        at.contacts.regime = ContactRegime::Augmented;
+        at.contacts.factor = HELD;
+        self.change_points(at, |point, stiffness| {
+            point.multiplier = point.force + stiffness.augmented * HELD * point.gap
+        });
+    }
+
+    fn begin_penalty(&self, at: &mut State) {
+        at.contacts.deepest = 0.0;
+        at.contacts.shortest = None;
+        self.change_points(at, |point, stiffness| {
+            point.offset = point.force / stiffness.penalty + point.gap;
+            point.steps = 0;
+        });
+    }
+
+    fn accept(&self, before: &State, at: &mut State) {
+        if at.contacts.regime == ContactRegime::Penalty {
+            self.judge_penalty(at);
+        }
+        let dissipated = self.remember(at, true);
+        let power = self.damping_power(at);
+        let passed = at.time - before.time;
+        at.contacts.dissipated += dissipated + 0.5 * (at.contacts.damping_power + power) * passed;
+        at.contacts.damping_power = power;
+        at.contacts.factor = at.contacts.first_factor;
+    }
+
+    fn change(&self, before: &State, at: &State) -> ContactChange {
+        let mut change = ContactChange::None;
+        self.each_chain(at, Weights::NONE, &mut |number, chain| {
+            let memory = before.contacts.chains.get(number);
+            let mut active = Vec::new();
+            let mut slides = Vec::new();
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                if point.state.normal_force.force > 0.0 {
+                    active.push(*point.candidate);
+                    slides.push(point.state.status() == Status::Slides);
+                }
+            });
+            let partners = chain.chain.matched(&active, memory);
+            let is_other = active.len() != memory.map_or(0, |memory| memory.points.len());
+            if slides.contains(&true) {
+                change = ContactChange::Slides;
+            } else if change == ContactChange::None && (is_other || partners.contains(&None)) {
+                change = ContactChange::Touches;
+            }
+        });
+        change
+    }
+
+    fn penetrates(&self, at: &State) -> Option<Penetration> {
+        let mut deepest: Option<Penetration> = None;
+        self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                let depth = -point.state.gap;
+                let is_deepest = deepest.as_ref().is_none_or(|deepest| depth > deepest.depth);
+                if depth > chain.laws.penetration && is_deepest {
+                    deepest = Some(Penetration {
+                        contact: chain.laws.name.clone(),
+                        surface: chain.surface.name.clone(),
+                        slot: chain.slot_of(point.candidate),
+                        depth,
+                    });
+                }
+            });
+        });
+        deepest
+    }
+
+    fn hidden_penetration(&self, at: &State) -> Option<Penetration> {
+        let mut deepest: Option<Penetration> = None;
+        for chain in &self.chains {
+            let laws = &self.laws[chain.contact];
+            if at.amplitude[laws.amplitude] == 0.0 {
+                continue;
+            }
+            let surface = &self.surfaces[chain.surface];
+            let depth = -chain.least_gap(&surface.surface, &surface.carrier(at, Weights::NONE), at);
+            let is_deepest = deepest.as_ref().is_none_or(|deepest| depth > deepest.depth);
+            if depth > ROUNDED * laws.penetration && is_deepest {
+                let slot = chain.nodes[chain.nodes.len() / 2].node.u;
+                deepest = Some(Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth });
+            }
+        }
+        deepest
+    }
+
+    fn passed(&self, from: &State, to: &State) -> Option<Slot> {
+        for chain in &self.chains {
+            if to.amplitude[self.laws[chain.contact].amplitude] == 0.0 {
+                continue;
+            }
+            let surface = &self.surfaces[chain.surface];
+            let depth = surface.depth();
+            if depth == f64::INFINITY {
+                continue;
+            }
+            let [before, after] =
+                [from, to].map(|at| with_middles(chain.seen(&surface.carrier(at, Weights::NONE), at)));
+            for (k, (before, after)) in before.iter().zip(&after).enumerate() {
+                let moved = (*after - *before).norm();
+                if moved <= depth {
+                    continue;
+                }
+                let [from, to] = [before, after].map(|place| surface.surface.distance(*place).ok());
+                let reach = from.map_or(0.0, |from| from.value + depth);
+                // Along a surface nodes may go farther; on its other side the normal is turned over.
+                let has_turned = from.zip(to).is_none_or(|(from, to)| from.normal.dot(to.normal) < 0.0);
+                if moved > reach && has_turned {
+                    return Some(chain.nodes[k % chain.nodes.len()].node.u);
+                }
+            }
+        }
+        None
+    }
+
+    fn energy(&self, at: &State) -> f64 {
+        let mut energy = 0.0;
+        if at.contacts.regime == ContactRegime::Augmented {
+            // The memory holds the tractions of the state.
+            for (number, chain) in self.chains.iter().enumerate() {
+                let laws = &self.laws[chain.contact];
+                let points = at.contacts.chains.get(number).filter(|_| laws.rubs()).map_or(&[][..], |m| &m.points);
+                for point in points {
+                    let element = (point.place as usize).min(chain.elements() - 1);
+                    let first = chain.stiffness[element].augmented * at.contacts.first_factor;
+                    energy += point.traction.squared() / (2.0 * laws.stick * first);
+                }
+            }
+            return energy;
+        }
+        self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            chain.each_point(Weights::NONE, &mut |point, _| energy += point.energy());
+        });
+        energy
+    }
+
+    fn resultant(&self, number: usize, at: &State) -> ContactResultant {
+        ContactResultant {
+            length: self.length_in_contact(number, at),
+            ..resultant::resultant(&self.chains, &self.surfaces, number, at)
+        }
+    }
+
+    fn force_along(&self, beam: usize, fraction: f64, at: &State) -> [f64; 2] {
+        resultant::force_along(&self.chains, beam, fraction, at)
+    }
+}

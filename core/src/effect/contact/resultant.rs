@@ -1,0 +1,77 @@
+//! Forces and gaps of contacts in an accepted state, for output.
+
+use super::chain::Chain;
+use super::surface::SceneSurface;
+use crate::effect::ContactResultant;
+use crate::kernel::Weights;
+use crate::system::{PointMemory, State};
+use crate::tensor::Vec3;
+
+/// The forces of contact number `number`.
+pub(super) fn resultant(chains: &[Chain], surfaces: &[SceneSurface], number: usize, at: &State) -> ContactResultant {
+    let o = Vec3::ZERO;
+    let mut sum = ContactResultant {
+        gap: f64::INFINITY,
+        normal: 0.0,
+        friction: 0.0,
+        force: o,
+        moment: o,
+        length: 0.0,
+        points: 0,
+        sliding: 0,
+    };
+    for (k, chain) in chains.iter().enumerate().filter(|(_, chain)| chain.contact == number) {
+        let surface = &surfaces[chain.surface];
+        let carrier = surface.carrier(at, Weights::NONE);
+        let about = if carrier.is_node { carrier.place } else { o };
+        sum.gap = sum.gap.min(chain.least_gap(&surface.surface, &carrier, at));
+        for point in points(k, at) {
+            sum.normal += point.force;
+            sum.friction += point.traction.norm();
+            sum.force += point.push;
+            sum.moment += (point.at - about).cross(point.push);
+            sum.points += 1;
+            sum.sliding += usize::from(point.slides);
+        }
+    }
+    sum
+}
+
+/// The points of a chain with a force.
+fn points(chain: usize, at: &State) -> &[PointMemory] {
+    at.contacts.chains.get(chain).map_or(&[], |memory| &memory.points)
+}
+
+/// Normal force and friction per length on a beam at a part of its length: between points linear.
+pub(super) fn force_along(chains: &[Chain], beam: usize, fraction: f64, at: &State) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for (k, chain) in chains.iter().enumerate().filter(|(_, chain)| chain.beam == Some(beam)) {
+        let here = force_of_chain(chain, points(k, at), chain.along(fraction));
+        sum = [sum[0] + here[0], sum[1] + here[1]];
+    }
+    sum
+}
+
+fn force_of_chain(chain: &Chain, points: &[PointMemory], along: f64) -> [f64; 2] {
+    let per_length = |point: &PointMemory| {
+        let share = chain.share(point.place);
+        [point.force / share, point.traction.norm() / share]
+    };
+    let next = points.partition_point(|point| point.place < along);
+    let width = 1.0 / chain.order as f64;
+    let near = |point: &&PointMemory| (point.place - along).abs() < width;
+    let before = next.checked_sub(1).and_then(|k| points.get(k)).filter(near);
+    let after = points.get(next).filter(near);
+    match (before, after) {
+        (Some(a), Some(b)) => {
+            let part = (along - a.place) / (b.place - a.place);
+            let [a, b] = [per_length(a), per_length(b)];
+            [0, 1].map(|k| a[k] + (b[k] - a[k]) * part)
+        }
+        (Some(point), None) | (None, Some(point)) => {
+            let part = 1.0 - (point.place - along).abs() / width;
+            per_length(point).map(|force| force * part)
+        }
+        (None, None) => [0.0; 2],
+    }
+}

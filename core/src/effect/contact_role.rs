@@ -1,0 +1,105 @@
+//! The role of contacts beside their forces.
+
+use crate::system::{Slot, State};
+use crate::tensor::Vec3;
+
+/// The role of contacts, whose memory is [`State::contacts`].
+pub trait Contacts {
+    /// Penetrations and changes of a balanced state.
+    fn survey(&self, at: &State) -> ContactSurvey;
+
+    /// Takes the normal forces of a balanced state as multipliers.
+    fn augment(&self, at: &mut State);
+
+    /// Holds the points that touch as they are, with their forces, for small vibrations about the
+    /// state.
+    fn hold(&self, at: &mut State);
+
+    /// Begins the penalty of dynamic stages with the forces of the multipliers.
+    fn begin_penalty(&self, at: &mut State);
+
+    /// Writes the memory of a state that is accepted after `before`.
+    fn accept(&self, before: &State, at: &mut State);
+
+    /// Changes of contacts since the accepted state `before`.
+    fn change(&self, before: &State, at: &State) -> ContactChange;
+
+    /// The deepest penetration of the contacts that act in a state, if it is larger than allowed.
+    fn penetrates(&self, at: &State) -> Option<Penetration>;
+
+    /// The deepest penetration among all points of beams in a state, those included that carry no
+    /// force, if it is larger than allowed.
+    fn hidden_penetration(&self, at: &State) -> Option<Penetration>;
+
+    /// A slot of a node that may have passed through a surface on the way from one state to another.
+    fn passed(&self, from: &State, to: &State) -> Option<Slot>;
+
+    /// The energy stored in an accepted state: of penalties and of elastic stick.
+    fn energy(&self, at: &State) -> f64;
+
+    /// The forces of a contact, by its number, in an accepted state.
+    fn resultant(&self, number: usize, at: &State) -> ContactResultant;
+
+    /// Normal force and friction per length, in an accepted state, on a beam at a part of its
+    /// length.
+    fn force_along(&self, beam: usize, fraction: f64, at: &State) -> [f64; 2];
+}
+
+/// A change of contacts in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ContactChange {
+    /// Points keep contact, and none slides.
+    #[default]
+    None,
+    /// A point has come into contact or left it: the path has a kink.
+    Touches,
+    /// A point slides: tangents have no symmetry.
+    Slides,
+}
+
+/// The contacts of a balanced state.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactSurvey {
+    /// The largest penetration, or gap with a force, over what is allowed
+    pub violation: f64,
+    /// That penetration or gap, a length
+    pub gap: f64,
+    /// A slot at that point
+    pub slot: Slot,
+    /// Number of points with a force
+    pub points: usize,
+}
+
+/// A penetration of a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Penetration {
+    /// Name of the contact
+    pub contact: String,
+    /// Name of the surface
+    pub surface: String,
+    /// A slot of a node there
+    pub slot: Slot,
+    /// Its depth, a length
+    pub depth: f64,
+}
+
+/// Forces and gaps of one contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactResultant {
+    /// The least gap, negative for a penetration; infinite where nothing has a distance
+    pub gap: f64,
+    /// The sum of normal forces
+    pub normal: f64,
+    /// The sum of the amounts of friction
+    pub friction: f64,
+    /// The force on beams and bodies (global components)
+    pub force: Vec3,
+    /// Its moment about the origin, or about the node that carries the surface
+    pub moment: Vec3,
+    /// The length of beams in contact
+    pub length: f64,
+    /// The number of points with a force
+    pub points: usize,
+    /// The number of points that slide
+    pub sliding: usize,
+}

@@ -1,0 +1,248 @@
+//! Coulomb friction with elastic stick: the traction t on the first party of a contact by return
+//! mapping, in the axes of the carrier.
+//!
+//! A contact has at the last converged state the traction t0 and the normal n0. The smallest
+//! rotation n0 -> n carries t0, and keeps |t0|. With a, the sliding since then, and K_t, the
+//! stiffness of stick:
+//!
+//! ```text
+//! u  = a - n (n.a)
+//! t* = t0 - (n.t0) s (n0+n) - K_t u,   s = 1/(1 + n0.n)
+//! t  = t* if |t*| <= mu p, otherwise mu p t*/|t*|
+//! ```
+//!
+//! and, with e = t*/|t*|,
+//!
+//! ```text
+//! dt* = -(n0+n) (t0 s - (n.t0) s^2 n0).dn - (n.t0) s dn - K_t du
+//! du  = da - n (n.da) - dn (n.a) - n (a.dn)
+//! stick dt = dt*;   slip dt = mu e dp + (mu p/|t*|) (dt* - e (e.dt*))
+//! ```
+//!
+//! The tangent of slip is not symmetric.
+
+use crate::scalar::Real;
+use crate::tensor::{Mat3, Vec3};
+
+/// Normals that turn by more than 120 degrees between converged states: 1 + n0.n is below this.
+const MIN_NORMAL_COSINE: f64 = 0.5;
+
+/// A traction of at least this part of its limit is at the limit, but for round-off.
+const AT_LIMIT: f64 = 1.0 - 1e-9;
+
+/// Coulomb's law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionLaw {
+    /// mu
+    pub coefficient: f64,
+    /// K_t, the stiffness of stick, force per length
+    pub stiffness: f64,
+}
+
+/// The traction of a contact at the last converged state. A contact that was open has none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CarriedTraction {
+    /// t0, force on the first party, in the axes of the carrier at that state
+    pub force: Vec3,
+    /// n0, the normal to which it was tangential
+    pub normal: Vec3,
+    /// True if it slid: with its force at the limit it goes on sliding in the first tangent of a
+    /// step. Otherwise all points would stick there, and a rope that is pulled over a drum would be
+    /// torn apart by each first correction.
+    pub slides: bool,
+}
+
+impl CarriedTraction {
+    /// The traction carried by the smallest rotation n0 -> n; zero if the contact was open.
+    pub fn carried_to(&self, n: Vec3) -> Vec3 {
+        if self.force == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        self.force - (self.normal + n) * (n.dot(self.force) / (1.0 + self.normal.dot(n)))
+    }
+}
+
+/// The state of a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// No force
+    Open,
+    /// A normal force alone
+    Frictionless,
+    /// Friction below its limit
+    Sticks,
+    /// Friction at its limit
+    Slides,
+}
+
+/// A traction with its derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Traction<T = f64> {
+    /// t, force on the first party
+    pub force: Vec3<T>,
+    /// Stick or slip
+    pub status: Status,
+    /// u, the tangential sliding since the last converged state
+    pub sliding: Vec3<T>,
+    /// (|t*| - |t|)/K_t, the part of the sliding that is not elastic, a length
+    pub slip: T,
+    /// True if the normal has turned by more than 120 degrees: the step is too large
+    pub turned_over: bool,
+    /// dt/da
+    pub over_sliding: Mat3<T>,
+    /// dt/dn
+    pub over_normal: Mat3<T>,
+    /// dt/dp
+    pub over_pressure: Vec3<T>,
+}
+
+impl<T: Real> Traction<T> {
+    /// No traction.
+    pub fn none() -> Self {
+        let o = Vec3::zero();
+        Self {
+            force: o,
+            status: Status::Frictionless,
+            sliding: o,
+            slip: T::zero(),
+            turned_over: false,
+            over_sliding: Mat3::zero(),
+            over_normal: Mat3::zero(),
+            over_pressure: o,
+        }
+    }
+}
+
+impl FrictionLaw {
+    /// The traction of a contact with the normal `n`, the force `p` and the sliding `a`.
+    pub fn traction<T: Real>(&self, carried: &CarriedTraction, n: Vec3<T>, p: T, a: Vec3<T>) -> Traction<T> {
+        let trial = self.trial(carried, n, a);
+        let limit = p * self.coefficient;
+        let size = trial.force.norm();
+        let goes_on = carried.slides && size.largest() > 0.0 && size.largest() >= AT_LIMIT * limit.largest();
+        if size.largest() <= limit.largest() && !goes_on {
+            return Traction { status: Status::Sticks, ..trial };
+        }
+        let inverse = T::one() / size;
+        let e = trial.force * inverse;
+        let across = (Mat3::identity() - e.outer(e)) * (limit * inverse);
+        Traction {
+            force: e * limit,
+            status: Status::Slides,
+            slip: (size - limit) * (1.0 / self.stiffness),
+            over_sliding: across * trial.over_sliding,
+            over_normal: across * trial.over_normal,
+            over_pressure: e.scale(self.coefficient),
+            ..trial
+        }
+    }
+
+    /// The traction t* without a limit.
+    fn trial<T: Real>(&self, carried: &CarriedTraction, n: Vec3<T>, a: Vec3<T>) -> Traction<T> {
+        let identity = Mat3::identity();
+        let along = n.dot(a);
+        let sliding = a - n * along;
+        let mut force = -sliding.scale(self.stiffness);
+        let mut over_normal = (Mat3::diagonal([along; 3]) + n.outer(a)).scale(self.stiffness);
+        let mut turned_over = false;
+        if carried.force != Vec3::ZERO {
+            let t0 = Vec3::constant(carried.force);
+            let n0 = Vec3::constant(carried.normal);
+            let cosine = T::one() + n0.dot(n);
+            turned_over = cosine.largest() < MIN_NORMAL_COSINE;
+            let s = T::one() / cosine;
+            let lift = n.dot(t0) * s;
+            force += t0 - (n0 + n) * lift;
+            over_normal -= (n0 + n).outer(t0 * s - n0 * (lift * s)) + identity * lift;
+        }
+        Traction {
+            force,
+            sliding,
+            turned_over,
+            over_sliding: (n.outer(n) - identity).scale(self.stiffness),
+            over_normal,
+            ..Traction::none()
+        }
+    }
+
+    /// The energy of elastic stick at a traction.
+    pub fn energy(&self, traction: Vec3) -> f64 {
+        traction.squared() / (2.0 * self.stiffness)
+    }
+
+    /// The work that friction has dissipated since the last converged state: -t.u less the growth of
+    /// the elastic energy. It is not negative; in stick it is |t - t0|^2/(2 K_t), of second order in
+    /// the step, since t stands for all of the step.
+    pub fn dissipation(&self, carried: &CarriedTraction, traction: &Traction) -> f64 {
+        -traction.force.dot(traction.sliding) - self.energy(traction.force) + self.energy(carried.force)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dual::{Dual, Random, jacobian, variables};
+    use super::*;
+
+    #[test]
+    fn tractions_have_their_derivatives() {
+        let mut random = Random(5);
+        let mut counts = [0; 2];
+        let mut worst = 0.0f64;
+        for _ in 0..600 {
+            let law = FrictionLaw { coefficient: random.between(0.1, 0.8), stiffness: random.between(0.5, 5.0) };
+            let n0 = random.direction();
+            let free = random.vector(1.0);
+            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+            let n = (n0 + random.vector(0.4)).normalized().unwrap();
+            let a = random.vector(0.5);
+            let p = random.between(0.1, 4.0);
+            type D = Dual<7>;
+            let exact = law.traction(&carried, variables::<7>(n, 0), D::variable(p, 6), variables(a, 3));
+            let here = law.traction(&carried, n, p, a);
+            counts[usize::from(here.status == Status::Slides)] += 1;
+            let pressure = Vec3(exact.force.0.map(|c| c.partials[6]));
+            for error in [
+                (jacobian(exact.force, 0) - here.over_normal).max_abs(),
+                (jacobian(exact.force, 3) - here.over_sliding).max_abs(),
+                (pressure - here.over_pressure).max_abs(),
+                here.force.dot(n).abs(),
+            ] {
+                worst = worst.max(error);
+            }
+        }
+        println!("tractions: {worst:e}, stick and slip {counts:?}");
+        assert!(worst < 1e-13 && counts.iter().all(|&count| count > 100), "{worst:e} {counts:?}");
+    }
+
+    #[test]
+    fn friction_never_gives_energy() {
+        let mut random = Random(6);
+        let mut least = f64::INFINITY;
+        for _ in 0..10_000 {
+            let law = FrictionLaw { coefficient: random.between(0.1, 0.8), stiffness: random.between(0.5, 5.0) };
+            let n0 = random.direction();
+            let free = random.vector(1.0);
+            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+            let n = (n0 + random.vector(0.5)).normalized().unwrap();
+            let traction = law.traction(&carried, n, random.between(0.1, 4.0), random.vector(0.5));
+            least = least.min(law.dissipation(&carried, &traction));
+        }
+        println!("least dissipation {least:e}");
+        assert!(least > 0.0);
+    }
+
+    #[test]
+    fn carried_tractions_keep_their_size() {
+        let mut random = Random(8);
+        for _ in 0..300 {
+            let n0 = random.direction();
+            let free = random.vector(1.0);
+            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+            let n = (n0 + random.vector(0.5)).normalized().unwrap();
+            let law = FrictionLaw { coefficient: 1.0, stiffness: 1.0 };
+            let traction = law.traction(&carried, n, 1e3, Vec3::ZERO);
+            assert_eq!(traction.status, Status::Sticks);
+            assert!((traction.force.norm() - carried.force.norm()).abs() < 1e-15);
+        }
+    }
+}

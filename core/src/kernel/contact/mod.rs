@@ -1,0 +1,36 @@
+//! Contact with friction of beams and bodies against rigid surfaces.
+//!
+//! Sections are round with a radius r for contact, whatever their stiffness. A contact adds f =
+//! dW/dq, in the sign of internal forces (g = f_int + f_acc - f_ext), and K = df/dq.
+//!
+//! Order of reading: [`surface`] and [`tube`] (distance, normal and curvature of rigid surfaces),
+//! [`law`] (normal force of a gap), [`friction`] (traction by return mapping), [`point`] (forces
+//! and tangent of one contact point), [`along`] (closest points that move along an element).
+//!
+//! Kernels here run one point at a time, not on lanes: branches may follow values.
+
+pub mod along;
+pub mod cone;
+pub mod distance;
+pub mod friction;
+pub mod law;
+pub mod minimum;
+pub mod point;
+pub mod surface;
+pub mod tube;
+pub mod variation;
+
+#[cfg(test)]
+mod dual;
+#[cfg(test)]
+mod tests;
+
+pub use along::{MAX_MINIMA, Minima, Minimum, MinimumKind, ShapeAt, minima};
+pub use cone::Cone;
+pub use distance::{Distance, Feature, Undefined};
+pub use friction::{CarriedTraction, FrictionLaw, Status, Traction};
+pub use law::{NormalForce, NormalLaw};
+pub use point::{Carrier, ContactLaw, Place, PointState, add_point};
+pub use surface::{Shape, Side, Surface};
+pub use tube::{Tube, TubeEnds, TubeError};
+pub use variation::{ContactNode, NodeBefore};

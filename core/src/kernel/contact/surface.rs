@@ -1,0 +1,434 @@
+//! Rigid surfaces by their signed distance phi, its gradient n and its Hessian H, at a point y in
+//! the axes of the surface's carrier (lengths).
+//!
+//! Outside of a body: phi > 0 in free space, n points from the body to the point, |n| = 1, H n = 0.
+//! Inside of it all three change their sign. The gap of a round section is phi - r.
+//!
+//! ```text
+//! plane      phi = e.(y-a)                             H = 0
+//! sphere     l=|y-c|, phi=l-R, n=(y-c)/l               H = (I-nn)/l
+//! cylinder   d=(I-ee)(y-a), l=|d|, phi=l-R, n=d/l      H = (I-ee-nn)/l
+//! capsule    by z=e.(y-a): sphere at an end (z<=0, z>=L) or cylinder
+//! cone       hull of two spheres (a,Ra),(b,Rb), k=(Ra-Rb)/L, c=sqrt(1-k^2), z=e.(y-a),
+//!            q=(I-ee)(y-a), l=|q|, s=z-lk/c; s<=0, s>=L: spheres;
+//!            else phi=cl+kz-Ra, n=cq/l+ke, H=c tt/l, t=e x q/l
+//! torus      z=e.d, q=d-ez, l=|q|, m=q/l, v=(l-A)m+ez, s=|v|, n=v/s, b=e x m
+//!            phi=s-R, H=(I-nn-bb)/s + (1-A/l)bb/s
+//! box        q=|y|-h: any q>0: v=max(q,0) sign y, l=|v|, n=v/l, H=(diag(q>0)-nn)/l;
+//!            otherwise the face of the largest q, H=0
+//! tube       see [`super::tube`]
+//! ```
+//!
+//! H jumps where the closest point passes from one part of a surface to another (the ends of
+//! capsules and cones, the borders of the faces of a box seen from outside). n jumps on the medial
+//! axis: inside a box where two faces are equally near, and where two pieces of a tube of straight
+//! pieces are. There the piece of the lower number is taken. [`Undefined`] names the points without
+//! a normal.
+
+use super::cone::Cone;
+use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, Undefined, sphere};
+use super::tube::Tube;
+use crate::scalar::Real;
+use crate::tensor::{Mat3, Vec3};
+
+/// The side of a surface on which beams are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Beams are outside of the body
+    Outside,
+    /// Beams are inside, as a wire in a tube
+    Inside,
+}
+
+/// The shape of a rigid surface, in the axes of its carrier. Directions are unit vectors, radii and
+/// half lengths positive.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// The half space behind a plane
+    Plane {
+        /// A point of the plane
+        point: Vec3,
+        /// The normal into free space
+        normal: Vec3,
+    },
+    /// A sphere
+    Sphere {
+        /// The centre
+        centre: Vec3,
+        /// The radius
+        radius: f64,
+    },
+    /// A cylinder without ends
+    Cylinder {
+        /// A point of the axis
+        point: Vec3,
+        /// The direction of the axis
+        axis: Vec3,
+        /// The radius
+        radius: f64,
+    },
+    /// A capsule or a cone with spherical ends
+    Cone(Cone),
+    /// A torus
+    Torus {
+        /// The centre
+        centre: Vec3,
+        /// The direction of the axis
+        axis: Vec3,
+        /// A, the radius of the ring's centre line
+        ring: f64,
+        /// R, the radius of the ring's section
+        radius: f64,
+    },
+    /// A box
+    Box {
+        /// The centre
+        centre: Vec3,
+        /// The directions of its edges, as columns of a rotation
+        axes: Mat3,
+        /// Half of its edges
+        half: [f64; 3],
+    },
+    /// A tube along a curve
+    Tube(Tube),
+}
+
+/// A rigid surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// Its shape
+    pub shape: Shape,
+    /// The side on which beams are
+    pub side: Side,
+}
+
+impl Surface {
+    /// The signed distance of the point `y`, in the axes of the carrier.
+    pub fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
+        let outside = self.shape.distance(y)?;
+        match self.side {
+            Side::Outside => Ok(outside),
+            Side::Inside => Ok(outside.reversed()),
+        }
+    }
+}
+
+impl Shape {
+    fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
+        match self {
+            Self::Plane { point, normal } => Ok(plane(y, *point, *normal)),
+            Self::Sphere { centre, radius } => {
+                let ball = sphere(y - Vec3::constant(*centre), *radius)?;
+                Ok(Distance { feature: Feature::Face, ..ball })
+            }
+            Self::Cylinder { point, axis, radius } => cylinder(y - Vec3::constant(*point), *axis, *radius),
+            Self::Cone(cone) => cone.distance(y),
+            Self::Torus { centre, axis, ring, radius } => torus(y - Vec3::constant(*centre), *axis, *ring, *radius),
+            Self::Box { centre, axes, half } => Ok(cuboid(y - Vec3::constant(*centre), *axes, *half)),
+            Self::Tube(tube) => tube.distance(y),
+        }
+    }
+
+    /// The radius within which a point that penetrates still finds its way out: from the surface
+    /// inward to the points where the normal is undefined or jumps. Infinite for planes.
+    pub fn depth(&self) -> f64 {
+        match self {
+            Self::Plane { .. } => f64::INFINITY,
+            Self::Sphere { radius, .. } | Self::Cylinder { radius, .. } | Self::Torus { radius, .. } => *radius,
+            Self::Cone(cone) => cone.least_radius(),
+            Self::Box { half, .. } => half[0].min(half[1]).min(half[2]),
+            Self::Tube(tube) => tube.least_radius(),
+        }
+    }
+}
+
+fn plane<T: Real>(y: Vec3<T>, point: Vec3, normal: Vec3) -> Distance<T> {
+    let normal = Vec3::constant(normal);
+    let value = normal.dot(y - Vec3::constant(point));
+    Distance { value, normal, curvature: Mat3::zero(), feature: Feature::Face }
+}
+
+fn cylinder<T: Real>(d: Vec3<T>, axis: Vec3, radius: f64) -> Result<Distance<T>, Undefined> {
+    let e = Vec3::constant(axis);
+    let q = d - e * e.dot(d);
+    let l = q.norm();
+    if l.largest() <= MIN_RELATIVE_DISTANCE * radius {
+        return Err(Undefined::Axis);
+    }
+    let inverse = T::one() / l;
+    let n = q * inverse;
+    let t = e.cross(n);
+    Ok(Distance { value: l - T::constant(radius), normal: n, curvature: t.outer(t) * inverse, feature: Feature::Face })
+}
+
+fn torus<T: Real>(d: Vec3<T>, axis: Vec3, ring: f64, radius: f64) -> Result<Distance<T>, Undefined> {
+    let e = Vec3::constant(axis);
+    let z = e.dot(d);
+    let q = d - e * z;
+    let l = q.norm();
+    if l.largest() <= MIN_RELATIVE_DISTANCE * ring {
+        return Err(Undefined::Axis);
+    }
+    let m = q * (T::one() / l);
+    let v = m * (l - T::constant(ring)) + e * z;
+    let s = v.norm();
+    if s.largest() <= MIN_RELATIVE_DISTANCE * radius {
+        return Err(Undefined::Ring);
+    }
+    let inverse = T::one() / s;
+    let n = v * inverse;
+    let b = e.cross(m);
+    let t = n.cross(b);
+    let around = (T::one() - T::constant(ring) / l) * inverse;
+    Ok(Distance {
+        value: s - T::constant(radius),
+        normal: n,
+        curvature: t.outer(t) * inverse + b.outer(b) * around,
+        feature: Feature::Face,
+    })
+}
+
+fn cuboid<T: Real>(d: Vec3<T>, axes: Mat3, half: [f64; 3]) -> Distance<T> {
+    let axes = Mat3::constant(axes);
+    let local = axes.transpose_mul(d);
+    let signs = local.0.map(|component| if component.largest() < 0.0 { -1.0 } else { 1.0 });
+    let mut excess = [T::zero(); 3];
+    for i in 0..3 {
+        excess[i] = local.0[i] * signs[i] - T::constant(half[i]);
+    }
+    let beyond = excess.map(|q| q.largest() > 0.0);
+    match beyond.iter().filter(|&&is| is).count() {
+        0 | 1 => face(&axes, &excess, &signs),
+        2 => rounded(&axes, &excess, &signs, beyond, Feature::Edge),
+        _ => rounded(&axes, &excess, &signs, beyond, Feature::Corner),
+    }
+}
+
+/// The distance from the face of a box from which the point is farthest.
+fn face<T: Real>(axes: &Mat3<T>, excess: &[T; 3], signs: &[f64; 3]) -> Distance<T> {
+    let mut largest = 0;
+    for i in 1..3 {
+        if excess[i].largest() > excess[largest].largest() {
+            largest = i;
+        }
+    }
+    Distance {
+        value: excess[largest],
+        normal: axes.column(largest).scale(signs[largest]),
+        curvature: Mat3::zero(),
+        feature: Feature::Face,
+    }
+}
+
+/// The distance from an edge or a corner of a box.
+fn rounded<T: Real>(
+    axes: &Mat3<T>,
+    excess: &[T; 3],
+    signs: &[f64; 3],
+    beyond: [bool; 3],
+    feature: Feature,
+) -> Distance<T> {
+    let mut v = Vec3::zero();
+    let mut open = Mat3::zero();
+    for i in 0..3 {
+        if beyond[i] {
+            v.0[i] = excess[i] * signs[i];
+            open.0[i][i] = T::one();
+        }
+    }
+    let l = v.norm();
+    let inverse = T::one() / l;
+    let n = v * inverse;
+    let local = (open - n.outer(n)) * inverse;
+    Distance { value: l, normal: *axes * n, curvature: *axes * local * axes.transpose(), feature }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::dual::{Random, jacobian, variables};
+    use super::super::tube::{TubeEnds, TubeError};
+    use super::*;
+
+    /// A winding centre line with a varying radius.
+    pub fn winding() -> (Vec<Vec3>, Vec<f64>) {
+        let points = vec![
+            Vec3([0.0, 0.0, 0.0]),
+            Vec3([1.0, 0.2, 0.1]),
+            Vec3([2.1, 0.9, 0.0]),
+            Vec3([2.6, 1.9, 0.5]),
+            Vec3([3.5, 2.4, 1.2]),
+        ];
+        (points, vec![0.5, 0.6, 0.55, 0.4, 0.45])
+    }
+
+    /// Surfaces of every kind, seen from outside.
+    pub fn shapes() -> Vec<(&'static str, Shape)> {
+        let mut random = Random(7);
+        let (points, radii) = winding();
+        let cone = |radii| Cone::new(Vec3([-0.4, 0.2, 0.1]), Vec3([0.7, 0.9, -0.5]), radii).map(Shape::Cone);
+        vec![
+            ("plane", Shape::Plane { point: random.vector(0.5), normal: random.direction() }),
+            ("sphere", Shape::Sphere { centre: random.vector(0.5), radius: 0.7 }),
+            ("cylinder", Shape::Cylinder { point: random.vector(0.5), axis: random.direction(), radius: 0.6 }),
+            ("capsule", cone([0.4, 0.4]).unwrap()),
+            ("cone", cone([0.8, 0.3]).unwrap()),
+            ("widening cone", cone([0.2, 0.9]).unwrap()),
+            ("torus", Shape::Torus { centre: random.vector(0.5), axis: random.direction(), ring: 1.1, radius: 0.3 }),
+            ("box", Shape::Box { centre: random.vector(0.2), axes: random.rotation(3.0).r, half: [0.4, 0.6, 0.9] }),
+            ("straight tube", Shape::Tube(Tube::straight(&points, &radii, TubeEnds::Round).unwrap())),
+            ("smooth tube", Shape::Tube(Tube::smooth(&points, &radii, TubeEnds::Round).unwrap())),
+        ]
+    }
+
+    /// The largest errors of n, H, |n| = 1 and H n = 0 at random points, and the number of points.
+    fn errors(surface: &Surface, random: &mut Random, scatter: f64) -> ([f64; 4], usize) {
+        let mut worst = [0.0f64; 4];
+        let mut points = 0;
+        while points < 500 {
+            let y = random.vector(scatter) + Vec3([0.5, 0.5, 0.0]);
+            let Ok(exact) = surface.distance(variables::<3>(y, 0)) else { continue };
+            let here = surface.distance(y).unwrap();
+            let size = 1.0 + here.curvature.max_abs();
+            // Derivatives of unit vectors lose digits near an axis.
+            if size > 20.0 {
+                continue;
+            }
+            points += 1;
+            let gradient = Vec3(exact.value.partials);
+            let hessian = jacobian(exact.normal, 0);
+            let errors = [
+                (gradient - here.normal).max_abs() / size,
+                (hessian - here.curvature).max_abs() / size,
+                (here.normal.norm() - 1.0).abs(),
+                (here.curvature * here.normal).max_abs() / size,
+            ];
+            for (worst, error) in worst.iter_mut().zip(errors) {
+                *worst = worst.max(error);
+            }
+        }
+        (worst, points)
+    }
+
+    #[test]
+    fn normals_and_curvatures_are_derivatives() {
+        let mut random = Random(11);
+        for (name, shape) in shapes() {
+            for side in [Side::Outside, Side::Inside] {
+                let surface = Surface { shape: shape.clone(), side };
+                let (worst, points) = errors(&surface, &mut random, 2.0);
+                println!("{name} {side:?}: {worst:?} at {points} points");
+                assert!(worst.iter().all(|&error| error < 1e-12), "{name} {side:?}: {worst:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_distance_leads_to_the_surface() {
+        let mut random = Random(12);
+        for (name, shape) in shapes() {
+            let surface = Surface { shape, side: Side::Outside };
+            for _ in 0..300 {
+                let y = random.vector(2.0) + Vec3([0.5, 0.5, 0.0]);
+                let Ok(here) = surface.distance(y) else { continue };
+                if here.value < 0.0 {
+                    continue;
+                }
+                let foot = surface.distance(y - here.normal * here.value).unwrap();
+                assert!(foot.value.abs() < 1e-14, "{name}: {foot:?}");
+                // phi is 1-Lipschitz: free space in a ball of its radius.
+                let other = y + random.direction() * random.between(0.0, 2.0);
+                if let Ok(there) = surface.distance(other) {
+                    let change = (there.value - here.value).abs();
+                    assert!(change <= (other - y).norm() + 1e-14, "{name}: {change}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn points_without_a_normal_are_named() {
+        let o = Vec3::ZERO;
+        let e = Vec3::UNIT[2];
+        let undefined = |shape: Shape, y: Vec3| Surface { shape, side: Side::Outside }.distance(y).unwrap_err();
+        let capsule = || Shape::Cone(Cone::new(o, e, [0.2, 0.2]).unwrap());
+        let torus = || Shape::Torus { centre: o, axis: e, ring: 2.0, radius: 0.5 };
+        let line = [o, e, e * 2.0];
+        let smooth = |ends| Shape::Tube(Tube::smooth(&line, &[0.2; 3], ends).unwrap());
+        let straight = |ends| Shape::Tube(Tube::straight(&line, &[0.2; 3], ends).unwrap());
+        assert_eq!(undefined(Shape::Sphere { centre: o, radius: 1.0 }, o), Undefined::Centre);
+        assert_eq!(undefined(Shape::Cylinder { point: o, axis: e, radius: 1.0 }, e), Undefined::Axis);
+        assert_eq!(undefined(capsule(), e), Undefined::Centre);
+        assert_eq!(undefined(capsule(), e * 0.5), Undefined::Axis);
+        assert_eq!(undefined(torus(), e), Undefined::Axis);
+        assert_eq!(undefined(torus(), Vec3([2.0, 0.0, 0.0])), Undefined::Ring);
+        for ends in [TubeEnds::Open, TubeEnds::Round] {
+            assert_eq!(undefined(smooth(ends), e * 0.7), Undefined::Axis);
+            assert_eq!(undefined(straight(ends), e * 0.7), Undefined::Axis);
+        }
+        for beyond in [-0.1, 2.1] {
+            assert_eq!(undefined(smooth(TubeEnds::Open), Vec3([0.1, 0.0, beyond])), Undefined::BeyondEnd);
+            assert_eq!(undefined(straight(TubeEnds::Open), Vec3([0.1, 0.0, beyond])), Undefined::BeyondEnd);
+        }
+    }
+
+    #[test]
+    fn parts_of_a_box_are_named() {
+        let shape = Shape::Box { centre: Vec3::ZERO, axes: Mat3::IDENTITY, half: [1.0, 2.0, 3.0] };
+        let surface = Surface { shape, side: Side::Outside };
+        let at = |y| surface.distance(Vec3(y)).unwrap();
+        assert_eq!(at([0.0, 0.5, 0.2]).feature, Feature::Face);
+        assert_eq!(at([0.0, 0.0, 0.0]).value, -1.0);
+        assert_eq!(at([-1.5, 0.5, 0.2]).normal, Vec3([-1.0, 0.0, 0.0]));
+        assert_eq!(at([4.0, 6.0, 0.0]).feature, Feature::Edge);
+        assert_eq!(at([4.0, 6.0, 0.0]).value, 5.0);
+        assert_eq!(at([2.0, 3.0, 4.0]).feature, Feature::Corner);
+    }
+
+    #[test]
+    fn a_tube_of_one_straight_piece_is_a_cone() {
+        let ends = [Vec3([-0.4, 0.2, 0.1]), Vec3([0.7, 0.9, -0.5])];
+        let radii = [0.5, 0.3];
+        let tube = |tube| Surface { shape: Shape::Tube(tube), side: Side::Inside };
+        let smooth = tube(Tube::smooth(&ends, &radii, TubeEnds::Round).unwrap());
+        let straight = tube(Tube::straight(&ends, &radii, TubeEnds::Round).unwrap());
+        let mut random = Random(13);
+        for _ in 0..300 {
+            let y = random.vector(1.0);
+            let (a, b) = (smooth.distance(y).unwrap(), straight.distance(y).unwrap());
+            assert!((a.value - b.value).abs() < 1e-14);
+            assert!((a.normal - b.normal).max_abs() < 1e-14);
+            let size = 1.0 + b.curvature.max_abs();
+            assert!((a.curvature - b.curvature).max_abs() < 1e-13 * size * size);
+        }
+    }
+
+    #[test]
+    fn splines_have_continuous_curvature() {
+        let (points, radii) = winding();
+        let shape = Shape::Tube(Tube::smooth(&points, &radii, TubeEnds::Round).unwrap());
+        let surface = Surface { shape, side: Side::Inside };
+        // Near the third point, on both sides of the border of pieces.
+        let at = |shift: f64| surface.distance(points[2] + Vec3([0.1 + shift, -0.1 + shift, 0.2])).unwrap();
+        let steps = (-50..50).map(|k| f64::from(k) * 2e-3);
+        for shift in steps {
+            let change = (at(shift + 1e-7).curvature - at(shift).curvature).max_abs();
+            assert!(change < 1e-4, "{shift}: {change}");
+        }
+    }
+
+    #[test]
+    fn impossible_tubes_are_refused() {
+        let o = Vec3::ZERO;
+        let e = Vec3::UNIT[0];
+        let smooth = |points: &[Vec3], radii: &[f64]| Tube::smooth(points, radii, TubeEnds::Open).unwrap_err();
+        assert_eq!(smooth(&[o], &[1.0]), TubeError::Points);
+        assert_eq!(smooth(&[o, e], &[1.0]), TubeError::Points);
+        assert_eq!(smooth(&[o, e, e], &[1.0; 3]), TubeError::Repeated(2));
+        assert_eq!(smooth(&[o, e], &[1.0, 0.0]), TubeError::Radius(1));
+        assert_eq!(smooth(&[o, e], &[1.0, f64::NAN]), TubeError::Radius(1));
+        assert_eq!(smooth(&[o, e], &[0.1, 2.0]), TubeError::Steep(0));
+        assert_eq!(Tube::straight(&[o, e], &[0.1, 2.0], TubeEnds::Open).unwrap_err(), TubeError::Steep(0));
+        let bend = [o, e, e + Vec3::UNIT[1]];
+        assert!(matches!(smooth(&bend, &[2.0; 3]), TubeError::Curved(_)));
+    }
+}

@@ -1,0 +1,114 @@
+//! Nodes in contact as a carrier sees them, and the derivatives of a contact force over what it
+//! depends on. Points on surfaces and pairs of beams share them.
+//!
+//! With the rotation Q of the carrier and S_i = Q^T R_i, a node has turned since the last converged
+//! state by theta_i = log(S_i S0_i^T), and d(theta_i) = T(theta_i)^-T times the spin of S_i. The
+//! rolling of a contact is Theta = sum N_i r theta_i, a length: with the radius r as arm.
+
+use super::along::ShapeAt;
+use crate::rotation::{Rotation, log};
+use crate::scalar::Real;
+use crate::tensor::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// A node as the carrier saw it at the last converged state.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct NodeBefore {
+    /// y0 = Q0^T (x0 - c0)
+    pub place: Vec3,
+    /// S0 = Q0^T R0
+    pub rotation: Mat3,
+}
+
+impl NodeBefore {
+    /// A node as a carrier with the place `c` and the rotation `q` sees it now: the memory for the
+    /// next step.
+    pub fn of(place: Vec3, rotation: Mat3, c: Vec3, q: &Mat3) -> Self {
+        Self { place: q.transpose_mul(place - c), rotation: q.transpose_matmul(rotation) }
+    }
+}
+
+/// A node of an element in contact.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactNode<T = f64> {
+    /// x, its place, spatial
+    pub place: Vec3<T>,
+    /// dx/dt; zero in statics
+    pub velocity: Vec3<T>,
+    /// Its rotation, with the tensor T of the unknown
+    pub rotation: Rotation<T>,
+    /// The node at the last converged state; only friction needs it
+    pub before: NodeBefore,
+}
+
+/// Rotations of the nodes as the carrier sees them, for friction.
+pub(super) struct Turned<const N: usize, T> {
+    /// S_i
+    pub(super) rotations: [Mat3<T>; N],
+    /// theta_i
+    pub(super) angles: [Vec3<T>; N],
+    /// T(theta_i)^-T
+    pub(super) maps: [Mat3<T>; N],
+    /// theta
+    pub(super) angle: Vec3<T>,
+}
+
+impl<const N: usize, T: Real> Turned<N, T> {
+    pub(super) fn new(nodes: &[ContactNode<T>; N], shape: &ShapeAt<N, T>, q: &Mat3<T>) -> Self {
+        let mut out = Self {
+            rotations: [Mat3::zero(); N],
+            angles: [Vec3::zero(); N],
+            maps: [Mat3::zero(); N],
+            angle: Vec3::zero(),
+        };
+        for i in 0..N {
+            let rotation = q.transpose_matmul(nodes[i].rotation.r);
+            let angle = log(rotation * Mat3::constant(nodes[i].before.rotation).transpose());
+            out.rotations[i] = rotation;
+            out.angles[i] = angle;
+            out.maps[i] = Rotation::new(angle).t_inverse().transpose();
+            out.angle += angle * shape.values[i];
+        }
+        out
+    }
+}
+
+/// A force or moment with its derivatives: over y at constant p, Theta, y0 and p.
+pub(super) struct Derived<T> {
+    pub(super) value: Vec3<T>,
+    pub(super) over_place: Mat3<T>,
+    pub(super) over_rolling: Mat3<T>,
+    pub(super) over_before: Mat3<T>,
+    pub(super) over_pressure: Vec3<T>,
+}
+
+/// Changes of what forces depend on, by a change of one scalar.
+pub(super) struct Change<T> {
+    pub(super) place: Vec3<T>,
+    pub(super) rolling: Vec3<T>,
+    pub(super) before: Vec3<T>,
+    pub(super) pressure: T,
+}
+
+/// The derivatives over a block of three unknowns, weighted, of what forces depend on.
+pub(super) struct Column<T> {
+    /// dy
+    pub(super) place: Mat3<T>,
+    /// dTheta
+    pub(super) rolling: Mat3<T>,
+    /// dp, a row
+    pub(super) pressure: Vec3<T>,
+}
+
+impl<T: Real> Derived<T> {
+    pub(super) fn by(&self, change: &Change<T>) -> Vec3<T> {
+        self.over_place * change.place
+            + self.over_rolling * change.rolling
+            + self.over_before * change.before
+            + self.over_pressure * change.pressure
+    }
+
+    pub(super) fn over(&self, column: &Column<T>) -> Mat3<T> {
+        self.over_place * column.place + self.over_rolling * column.rolling + self.over_pressure.outer(column.pressure)
+    }
+}

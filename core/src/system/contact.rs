@@ -1,0 +1,101 @@
+//! Memory of contacts: what a run takes from one converged state to the next.
+
+use crate::kernel::contact::NodeBefore;
+use crate::tensor::Vec3;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// The law of normal forces in a stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+pub enum ContactRegime {
+    /// Multipliers that augmentations bring to equilibrium: static stages
+    #[default]
+    Augmented,
+    /// A penalty with damping: dynamic stages
+    Penalty,
+}
+
+/// The contacts of a scene between two converged states.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct ContactMemory {
+    /// The law of normal forces
+    pub regime: ContactRegime,
+    /// Factor on the first stiffness of contacts with which a load level begins
+    pub first_factor: f64,
+    /// Present factor on the first stiffness of contacts
+    pub factor: f64,
+    /// True if points that slid go on sliding in the first tangent of a level
+    pub goes_on: bool,
+    /// Energy that friction and damping of contacts have taken since the start of the run
+    pub dissipated: f64,
+    /// Energy per time that the damping of contacts takes
+    pub damping_power: f64,
+    /// The largest penetration in the present dynamic stage, over the one that is allowed
+    pub deepest: f64,
+    /// The number of steps of the shortest contact in the present dynamic stage, from the step with
+    /// its first force to the last one; none if no contact has ended
+    pub shortest: Option<u32>,
+    /// Contacts of each chain: a beam or a body against a surface
+    pub chains: Arc<Vec<ChainMemory>>,
+}
+
+impl Default for ContactMemory {
+    fn default() -> Self {
+        Self {
+            regime: ContactRegime::Augmented,
+            first_factor: 1.0,
+            factor: 1.0,
+            goes_on: true,
+            dissipated: 0.0,
+            damping_power: 0.0,
+            deepest: 0.0,
+            shortest: None,
+            chains: Arc::default(),
+        }
+    }
+}
+
+impl ContactMemory {
+    /// True if some point has a force.
+    pub fn touches(&self) -> bool {
+        self.chains.iter().any(|chain| !chain.points.is_empty())
+    }
+}
+
+/// Contacts of a beam or a body against a surface.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+pub struct ChainMemory {
+    /// Points with a force, in the order of their places
+    pub points: Vec<PointMemory>,
+    /// The nodes as the surface saw them at the last converged state; empty without friction, and
+    /// before the first state
+    pub nodes: Vec<NodeBefore>,
+}
+
+/// A contact point with a force.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct PointMemory {
+    /// Its place: the number of its element plus the part of that element before it
+    pub place: f64,
+    /// p, the normal force
+    pub force: f64,
+    /// L of the next evaluation in static stages, with which the force of an accepted state is p
+    pub multiplier: f64,
+    /// g, the gap, a length
+    pub gap: f64,
+    /// t0, the traction at the last converged state, in the axes of the surface
+    pub traction: Vec3,
+    /// n0, the normal at the last converged state, in the axes of the surface
+    pub normal: Vec3,
+    /// True if it slid at the last converged state
+    pub slides: bool,
+    /// The gap at which the penalty begins, a length: a dynamic stage begins with the forces of the
+    /// static one before
+    pub offset: f64,
+    /// The number of steps of a dynamic stage in contact
+    pub steps: u32,
+    /// The force on the beam or body (global components)
+    pub push: Vec3,
+    /// The place where bodies touch (global components)
+    pub at: Vec3,
+}

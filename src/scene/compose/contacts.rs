@@ -1,0 +1,312 @@
+//! Contacts of beams and bodies with surfaces.
+
+use super::{Composer, stage_set};
+use crate::deck::{
+    self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, SectionBody, Shape, Spanned,
+    StageBody, SurfaceMotion,
+};
+use crate::scene::mesh::MeshBeam;
+use crate::scene::names::{self, unknown};
+use crate::scene::surfaces;
+use beamsim_core::effect::contact::{
+    Chain, ChainNode, ContactLaws, ContactStiffness, SceneSurface, SurfaceCarrier, SurfaceContacts,
+};
+use beamsim_core::kernel::contact::law::damping_of;
+use beamsim_core::model::Amplitude;
+use beamsim_core::run::Driven;
+use beamsim_core::tensor::Vec3;
+use std::f64::consts::PI;
+
+/// The largest penetration of contacts that name none, over the radius.
+const PENETRATION: f64 = 1e-3;
+
+/// The first stiffness of contacts with beams, over the bending stiffness of an element.
+const OF_BENDING: f64 = 1e-2;
+
+/// The first stiffness of contacts with beams, over the stiffness of an element in extension.
+const OF_EXTENSION: f64 = 1e-4;
+
+/// Steps that a contact in a dynamic stage lasts, at least.
+const STEPS_OF_CONTACT: f64 = 10.0;
+
+const NAME: &str = "contact with surfaces";
+const FRICTION: &str = "friction of contacts";
+
+/// A beam or a node of a contact, before it meets surfaces.
+struct Party {
+    beam: Option<usize>,
+    radius: f64,
+    length: f64,
+    nodes: Vec<ChainNode>,
+    order: usize,
+    stiffness: Vec<ContactStiffness>,
+}
+
+impl Composer<'_> {
+    pub(super) fn contacts(&mut self) {
+        let deck = self.deck;
+        let is_off = !deck.effects.allow(EffectWord::Contact);
+        if deck.contacts.is_empty() || is_off {
+            let why = if is_off { super::SWITCHED_OFF } else { "no [[contact]]" };
+            self.reason(NAME, false, why);
+            return self.reason(FRICTION, false, why);
+        }
+        let surfaces: Vec<Option<SceneSurface>> = deck.surfaces.iter().map(|table| self.surface(table)).collect();
+        let mut out = SurfaceContacts::default();
+        for contact in &deck.contacts {
+            self.add_contact(contact, &surfaces, &mut out);
+        }
+        // Contacts keep the numbers of the tables of surfaces.
+        let Some(surfaces) = surfaces.into_iter().collect::<Option<Vec<_>>>() else { return };
+        out.surfaces = surfaces;
+        let rubs = out.laws.iter().any(ContactLaws::rubs);
+        let elements: usize = out.chains.iter().map(Chain::elements).sum();
+        let reason = format!(
+            "{} [[contact]] table(s): {elements} pair(s) of an element or a body with a surface",
+            deck.contacts.len()
+        );
+        if rubs {
+            self.reason(FRICTION, true, "`friction` in [[contact]]");
+        } else if deck.effects.allow(EffectWord::Friction) {
+            self.reason(FRICTION, false, "no `friction` in [[contact]]");
+        } else {
+            self.reason(FRICTION, false, super::SWITCHED_OFF);
+        }
+        self.push(out, reason);
+    }
+
+    fn report(&mut self, diagnostic: Diagnostic) {
+        self.diagnostics.push(diagnostic);
+    }
+
+    fn surface(&mut self, table: &deck::Surface) -> Option<SceneSurface> {
+        let surface = match surfaces::surface(self.deck, table) {
+            Ok(surface) => surface,
+            Err(diagnostic) => {
+                self.report(diagnostic);
+                return None;
+            }
+        };
+        let carrier = self.carrier(table)?;
+        Some(SceneSurface { name: table.name.value.clone(), surface, carrier })
+    }
+
+    fn carrier(&mut self, table: &deck::Surface) -> Option<SurfaceCarrier> {
+        if let Some(on) = &table.on {
+            let (node, _) = self.node(on)?;
+            let node = self.mesh.nodes[node];
+            return Some(SurfaceCarrier::Node { node: node.node, place: node.place });
+        }
+        match &table.motion {
+            None => Some(SurfaceCarrier::Ground),
+            Some(SurfaceMotion::Shift(shift)) => {
+                let shift = Vec3(*shift);
+                let direction = shift.normalized().unwrap_or(Vec3::UNIT[0]);
+                let amplitude = self.motion_of_surface(table, shift.norm())?;
+                Some(SurfaceCarrier::Shift { direction, amplitude })
+            }
+            Some(SurfaceMotion::Turn { axis, about, angle }) => {
+                let about = names::place(self.deck, about).map_err(|diagnostic| self.report(diagnostic)).ok()?;
+                let amplitude = self.motion_of_surface(table, *angle)?;
+                Some(SurfaceCarrier::Turn { about, axis: Vec3(*axis), amplitude })
+            }
+        }
+    }
+
+    /// The number of the amplitude of a surface that moves by `full`.
+    fn motion_of_surface(&mut self, table: &deck::Surface, full: f64) -> Option<usize> {
+        let found = crate::scene::constraints::find_history(self.deck, self.histories, table.history.as_ref());
+        let history = found.map_err(|diagnostic| self.diagnostics.push(diagnostic)).ok()?;
+        self.out.amplitudes.push(Amplitude::of_motion(full, history, stage_set(table.stages.as_ref())));
+        let number = self.out.amplitudes.len() - 1;
+        if let Some(history) = table.history.clone() {
+            let drives = Driven::Amplitude(number);
+            let (what, span) = ("motion of a surface", table.span.clone());
+            self.out.driven.push(super::DrivenTable { drives, what, span, history: Some(history) });
+        }
+        Some(number)
+    }
+
+    fn add_contact(&mut self, contact: &deck::Contact, surfaces: &[Option<SceneSurface>], out: &mut SurfaceContacts) {
+        let parties = self.parties(contact);
+        let radius = parties.iter().map(|party| party.radius).fold(f64::INFINITY, f64::min);
+        let penetration = contact.penetration.unwrap_or(PENETRATION * radius);
+        let number = out.laws.len();
+        out.laws.push(ContactLaws {
+            name: contact.name.value.clone(),
+            friction: contact.friction,
+            stick: contact.stick,
+            penetration: if penetration.is_finite() { penetration } else { 1.0 },
+            damping: match contact.damping {
+                ContactDamping::Factor(damping) => damping,
+                ContactDamping::Restitution { restitution, speed } => {
+                    damping_of(restitution, speed).unwrap_or_default()
+                }
+            },
+            amplitude: self.switch(contact.stages.as_ref()),
+        });
+        for name in &contact.surfaces {
+            let Some(surface) = self.deck.surfaces.iter().position(|surface| surface.name.value == name.value) else {
+                let known = self.deck.surfaces.iter().map(|surface| surface.name.value.as_str());
+                self.report(unknown("surface", name, known));
+                continue;
+            };
+            let carrier = surfaces[surface].as_ref().and_then(SceneSurface::carrier_node);
+            for party in &parties {
+                if carrier.is_some_and(|carrier| party.nodes.iter().any(|node| node.node.u == carrier.u)) {
+                    let message = format!("the surface `{}` is carried by a node that would touch it", name.value);
+                    self.report(Diagnostic::error(message, name.span.clone()));
+                    continue;
+                }
+                out.chains.push(Chain {
+                    contact: number,
+                    surface,
+                    beam: party.beam,
+                    radius: party.radius,
+                    length: party.length,
+                    nodes: party.nodes.clone(),
+                    order: party.order,
+                    stiffness: party.stiffness.clone(),
+                    has_caps: contact.ends == EndsWord::Round,
+                });
+            }
+        }
+    }
+
+    fn parties(&mut self, contact: &deck::Contact) -> Vec<Party> {
+        let mut parties = Vec::new();
+        self.refuse_unused_radii(contact);
+        for name in &contact.beams {
+            let Some(number) = self.mesh.beams.iter().position(|beam| beam.name == name.value) else {
+                let known = self.deck.beams.iter().map(|beam| beam.name.value.as_str());
+                self.report(unknown("beam", name, known));
+                continue;
+            };
+            let radius = self.radius(contact, name, Some(&self.mesh.beams[number]));
+            parties.extend(radius.map(|radius| self.beam_party(contact, number, radius)));
+        }
+        for name in &contact.nodes {
+            let Some((node, _)) = self.node(name) else { continue };
+            let radius = self.radius(contact, name, None);
+            let stiffness = self.stiffness_at(contact, node);
+            if stiffness.is_none() {
+                let message = format!("the contact of node `{}` needs `stiffness`: no beam gives one", name.value);
+                let help = "`stiffness` is the force per penetration of a point";
+                self.report(Diagnostic::error(message, contact.span.clone()).help(help));
+            }
+            let (Some(radius), Some(stiffness)) = (radius, stiffness) else { continue };
+            let placed = self.mesh.nodes[node];
+            parties.push(Party {
+                beam: None,
+                radius,
+                length: 0.0,
+                nodes: vec![ChainNode { node: placed.node, place: placed.place, fraction: 0.0 }],
+                order: 0,
+                stiffness: vec![stiffness],
+            });
+        }
+        parties
+    }
+
+    fn refuse_unused_radii(&mut self, contact: &deck::Contact) {
+        let ContactRadius::Each(radii) = &contact.radius else { return };
+        let all: Vec<&str> = contact.beams.iter().chain(&contact.nodes).map(|name| name.value.as_str()).collect();
+        for (name, _) in radii.iter().filter(|(name, _)| !all.contains(&name.value.as_str())) {
+            self.report(unknown("beam or node of this contact", name, all.iter().copied()));
+        }
+    }
+
+    /// The radius of a beam or a node in contact.
+    fn radius(&mut self, contact: &deck::Contact, name: &Spanned<String>, beam: Option<&MeshBeam>) -> Option<f64> {
+        let found = match &contact.radius {
+            ContactRadius::One(radius) => Some(*radius),
+            ContactRadius::Each(radii) => {
+                radii.iter().find(|(known, _)| known.value == name.value).map(|(_, radius)| *radius)
+            }
+            ContactRadius::OfSections => beam.and_then(|beam| radius_of_sections(self.deck, &beam.name)),
+        };
+        if found.is_none() {
+            let message = format!("the contact needs a `radius` for `{}`", name.value);
+            let help = "only beams with one section of shape = \"circle\" or \"tube\" have a radius of their own";
+            self.report(Diagnostic::error(message, contact.span.clone()).help(help));
+        }
+        found
+    }
+
+    fn beam_party(&self, contact: &deck::Contact, number: usize, radius: f64) -> Party {
+        let beam = &self.mesh.beams[number];
+        let node = |(&node, &fraction): (&usize, &f64)| {
+            let placed = self.mesh.nodes[node];
+            ChainNode { node: placed.node, place: placed.place, fraction }
+        };
+        Party {
+            beam: Some(number),
+            radius,
+            length: beam.line.length,
+            nodes: beam.nodes.iter().zip(&beam.fractions).map(node).collect(),
+            order: beam.order,
+            stiffness: (0..beam.elements.len()).map(|k| self.stiffness_of(contact, beam, k)).collect(),
+        }
+    }
+
+    /// The stiffness of contacts of element `k` of a beam.
+    fn stiffness_of(&self, contact: &deck::Contact, beam: &MeshBeam, k: usize) -> ContactStiffness {
+        if let Some(stiffness) = contact.stiffness {
+            return ContactStiffness { augmented: stiffness, penalty: stiffness };
+        }
+        let [from, to] = [beam.fractions[k * beam.order], beam.fractions[(k + 1) * beam.order]];
+        let section = beam.section.at(0.5 * (from + to));
+        let width = beam.line.length * (to - from) / beam.order as f64;
+        let extension = section.stiffness[0][0] / width;
+        let bending = section.stiffness[4][4].min(section.stiffness[5][5]) / (width * width * width);
+        let mass = section.mass.map_or(0.0, |mass| mass.mass) * width;
+        let resolved = match shortest_step(self.deck) {
+            Some(step) if mass > 0.0 => mass * (PI / (STEPS_OF_CONTACT * step)).powi(2),
+            Some(_) | None => f64::INFINITY,
+        };
+        ContactStiffness {
+            augmented: OF_BENDING * bending + OF_EXTENSION * extension,
+            penalty: extension.min(resolved),
+        }
+    }
+
+    /// The stiffness of contacts of a node: that of the deck, or of a beam there.
+    fn stiffness_at(&self, contact: &deck::Contact, node: usize) -> Option<ContactStiffness> {
+        if let Some(stiffness) = contact.stiffness {
+            return Some(ContactStiffness { augmented: stiffness, penalty: stiffness });
+        }
+        self.mesh.beams.iter().find_map(|beam| {
+            let number = beam.nodes.iter().position(|&known| known == node)?;
+            Some(self.stiffness_of(contact, beam, (number / beam.order).min(beam.elements.len() - 1)))
+        })
+    }
+}
+
+/// The shortest time step that dynamic stages of a deck begin with.
+fn shortest_step(deck: &Deck) -> Option<f64> {
+    let steps = deck.stages.iter().filter_map(|stage| match stage.body {
+        StageBody::Dynamic { step, .. } => Some(step),
+        StageBody::Static { .. } | StageBody::Path { .. } | StageBody::Modal { .. } | StageBody::Buckling { .. } => {
+            None
+        }
+    });
+    steps.min_by(f64::total_cmp)
+}
+
+/// The radius of a beam whose sections are equal circles or tubes.
+fn radius_of_sections(deck: &Deck, beam: &str) -> Option<f64> {
+    let beam = deck.beams.iter().find(|known| known.name.value == beam)?;
+    let radius = |name: &Spanned<String>| {
+        let section = deck.sections.iter().find(|section| section.name.value == name.value)?;
+        match section.body {
+            SectionBody::Shaped { shape: Shape::Circle { radius } | Shape::Tube { radius, .. }, .. } => Some(radius),
+            SectionBody::Shaped { shape: Shape::Rectangle { .. }, .. }
+            | SectionBody::Resultants { .. }
+            | SectionBody::Full { .. }
+            | SectionBody::Computed(_) => None,
+        }
+    };
+    let radii: Option<Vec<f64>> = beam.sections.iter().map(radius).collect();
+    let radii = radii?;
+    radii.iter().all(|radius| *radius == radii[0]).then_some(radii[0])
+}

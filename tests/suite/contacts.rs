@@ -1,0 +1,229 @@
+//! Contact with surfaces in whole scenes.
+
+use crate::scenes::{attempt, refusal, simulate};
+use beamsim_core::failure::FailureKind;
+
+/// A cantilever that a cylinder pushes down, in `steps` levels.
+fn under_cylinder(elements: usize, order: usize, steps: usize, extra: &str) -> String {
+    format!(
+        r#"
+[point]
+root = [0, 0, 0]
+tip = [1, 0, 0]
+[section.s]
+EA = 1e8
+GA = 1e8
+GJ = 100
+EI = 100
+[[beam]]
+name = "beam"
+section = "s"
+through = ["root", "tip"]
+elements = {elements}
+order = {order}
+[[support]]
+at = "root"
+fix = "all"
+[[surface]]
+name = "cylinder"
+kind = "cylinder"
+from = [0.7, -1, 0.1]
+to = [0.7, 1, 0.1]
+radius = 0.09
+move = [0, 0, -0.3]
+[[contact]]
+name = "push"
+beams = ["beam"]
+surfaces = ["cylinder"]
+radius = 0.01
+{extra}
+[[stage]]
+kind = "static"
+steps = {steps}
+[output]
+nodes = ["root", "tip"]
+columns = ["u", "reaction", "contact", "energy"]
+"#
+    )
+}
+
+/// The force of the shooting solution of decks/contact/cantilever_under_cylinder.toml.
+const FORCE: f64 = 247.49394512297124;
+
+#[test]
+fn the_force_of_a_moving_closest_point_converges_fast() {
+    for (elements, order, limit) in [(50, 1, 1e-3), (25, 2, 1e-3), (17, 3, 2e-3)] {
+        let simulation = simulate(&under_cylinder(elements, order, 20, ""));
+        let error = (simulation.end("push.normal") / FORCE - 1.0).abs();
+        println!(
+            "{elements} elements of order {order}: {error:.2e}, {} iterations",
+            simulation.counters.work.iterations
+        );
+        assert!(error < limit, "{elements} elements of order {order}: {error}");
+    }
+}
+
+#[test]
+fn cut_backs_give_the_answer_of_small_levels() {
+    let [few, many] = [3, 40].map(|steps| simulate(&under_cylinder(40, 1, steps, "friction = 0.2")));
+    let [few, many] = [few, many].map(|simulation| [simulation.end("push.normal"), simulation.end("tip.uz")]);
+    // The path of friction depends on the levels a little.
+    assert!((few[0] / many[0] - 1.0).abs() < 0.02 && (few[1] / many[1] - 1.0).abs() < 0.01, "{few:?} {many:?}");
+}
+
+#[test]
+fn the_answer_does_not_depend_on_the_stiffness() {
+    let forces = [1e3, 1e5, 1e7].map(|stiffness| {
+        simulate(&under_cylinder(40, 1, 20, &format!("stiffness = {stiffness}\npenetration = 1e-8"))).end("push.normal")
+    });
+    assert!(forces.iter().all(|force| (force / forces[0] - 1.0).abs() < 1e-6), "{forces:?}");
+}
+
+/// Balance of forces, and the work of the moving surface.
+#[test]
+fn reactions_and_energies_balance() {
+    let simulation = simulate(&under_cylinder(40, 1, 40, ""));
+    for axis in ["x", "y", "z"] {
+        let sum = simulation.end(&format!("root.f{axis}")) + simulation.end(&format!("push.f{axis}"));
+        assert!(sum.abs() < 1e-6 * FORCE, "{axis}: {sum}");
+    }
+    let [total, strain] = ["energy.total", "energy.strain"].map(|name| simulation.end(name));
+    assert!(total.abs() < 0.01 * strain, "{total} {strain}");
+}
+
+/// A scene whose parts do not meet is the same with contact and without, to the last bit.
+#[test]
+fn contacts_that_never_touch_change_nothing() {
+    let far = under_cylinder(20, 1, 5, "").replace("0.7, -1, 0.1", "0.7, -1, 5").replace("0.7, 1, 0.1", "0.7, 1, 5");
+    let load = "[[load]]\nat = \"tip\"\nforce = [0, 0, 50]\n";
+    let with = (load.to_string() + &far).replace("columns = [\"u\", \"reaction\", \"contact\", \"energy\"]", "");
+    let start = with.find("[[surface]]").unwrap();
+    let end = with.find("[[stage]]").unwrap();
+    let without = with[..start].to_string() + &with[end..];
+    let [with, without] = [with, without].map(|text| simulate(&text));
+    assert_eq!(with.rows, without.rows);
+    assert_eq!(with.counters.work.iterations, without.counters.work.iterations);
+}
+
+/// A heavy block on a plane of 20 degrees.
+fn block(friction: f64, stage: &str) -> String {
+    format!(
+        r#"
+gravity = ["9.81*sin(20*deg)", 0, "-9.81*cos(20*deg)"]
+[point]
+block = [0, 0, 0.1]
+[[body]]
+at = "block"
+mass = 1
+[[surface]]
+name = "incline"
+kind = "plane"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+[[contact]]
+name = "base"
+nodes = ["block"]
+surfaces = ["incline"]
+radius = 0.1
+stiffness = 1e4
+friction = {friction}
+{stage}
+[output]
+nodes = ["block"]
+columns = ["u", "v", "contact", "energy"]
+"#
+    )
+}
+
+#[test]
+fn a_block_creeps_elastically_where_it_sticks() {
+    let simulation = simulate(&block(0.4, "[[stage]]\nkind = \"static\"\nsteps = 4"));
+    let creep = simulation.end("block.ux");
+    assert!((creep * 1e4 / 3.3552176060248105 - 1.0).abs() < 1e-6, "{creep}");
+    assert_eq!(simulation.end("base.sliding"), 0.0);
+    let total = simulation.end("energy.total");
+    assert!(total.abs() < 1e-9, "{total}");
+}
+
+#[test]
+fn a_block_that_slides_has_no_equilibrium() {
+    let simulation = attempt(&block(0.3, "[[stage]]\nkind = \"static\"\nsteps = 4"));
+    assert!(simulation.result.is_err());
+}
+
+#[test]
+fn a_run_does_not_begin_with_a_penetration() {
+    let deep = block(0.3, "[[stage]]\nkind = \"static\"\nsteps = 4").replace("[0, 0, 0.1]", "[0, 0, 0.05]");
+    let failure = attempt(&deep).result.unwrap_err();
+    assert_eq!(failure.kind(), FailureKind::ContactStart, "{failure}");
+}
+
+#[test]
+fn what_contact_cannot_do_is_refused_by_name() {
+    let deck = |extra: &str| under_cylinder(10, 1, 5, extra);
+    for (text, message) in [
+        (deck("with = [\"beam\"]"), "contact of beams with beams is not available"),
+        (deck("self = true"), "contact of a beam with itself is not available"),
+        (deck("start = \"push\""), "`start` is not available"),
+        (
+            deck("friction = 0.1") + "[[stage]]\nkind = \"buckling\"\nmodes = 1\n",
+            "a buckling stage does not support [[contact]]",
+        ),
+        (
+            deck("").replace("steps = 5", "steps = 5\ncontrol = \"arc_length\""),
+            "control = \"arc_length\" does not support",
+        ),
+        (deck("") + "[effects]\nlarge_rotations = false\n", "large_rotations = false does not support [[contact]]"),
+        (deck("").replace("name = \"push\"", "name = \"tip\""), "has the name of a point"),
+    ] {
+        let found = refusal(&text);
+        assert!(found.contains(message), "{message}: {found}");
+    }
+}
+
+/// A ball that hits a wall, as `extra` keys of its contact say.
+fn ball(extra: &str, step: f64) -> String {
+    format!(
+        r#"
+[point]
+ball = [0, 0, 0.11]
+[[body]]
+at = "ball"
+mass = 1
+[[initial]]
+at = "ball"
+velocity = [0, 0, -2]
+[[surface]]
+name = "wall"
+kind = "plane"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+[[contact]]
+name = "hit"
+nodes = ["ball"]
+surfaces = ["wall"]
+radius = 0.1
+stiffness = 1e6
+penetration = 0.003
+{extra}
+[[stage]]
+kind = "dynamic"
+end = 0.02
+step = {step}
+[output]
+nodes = ["ball"]
+columns = ["u", "v", "contact", "energy"]
+"#
+    )
+}
+
+#[test]
+fn a_ball_rebounds_with_its_restitution() {
+    for (extra, rebound) in [("", 1.0), ("damping = 0.25", 0.7484349315974341), ("restitution = 0.5\nspeed = 2", 0.5)] {
+        let simulation = simulate(&ball(extra, 3e-5));
+        let velocity = simulation.end("ball.vz");
+        assert!((velocity / (2.0 * rebound) - 1.0).abs() < 2e-3, "{extra}: {velocity}");
+        let total = simulation.end("energy.total");
+        assert!(total.abs() < 5e-3 * 2.0, "{extra}: {total}");
+    }
+}
