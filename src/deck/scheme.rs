@@ -14,6 +14,8 @@ words! {
         GeneralizedAlpha = "generalized_alpha",
         /// Increments of rotation in the tangent space
         LieGeneralizedAlpha = "lie_generalized_alpha",
+        /// Lobatto IIIA of order four
+        Lobatto = "lobatto",
     }
 }
 
@@ -28,6 +30,8 @@ pub enum SchemeWord {
     GeneralizedAlpha(f64),
     /// rho_inf
     LieGeneralizedAlpha(f64),
+    /// Without coefficients
+    Lobatto,
 }
 
 impl SchemeWord {
@@ -38,6 +42,7 @@ impl SchemeWord {
             Self::Hht(_) => SchemeName::Hht,
             Self::GeneralizedAlpha(_) => SchemeName::GeneralizedAlpha,
             Self::LieGeneralizedAlpha(_) => SchemeName::LieGeneralizedAlpha,
+            Self::Lobatto => SchemeName::Lobatto,
         }
     }
 
@@ -45,7 +50,7 @@ impl SchemeWord {
     pub fn renamed(self, name: SchemeName) -> Self {
         let rho_inf = match self {
             Self::GeneralizedAlpha(rho_inf) | Self::LieGeneralizedAlpha(rho_inf) => rho_inf,
-            Self::Newmark(..) | Self::Hht(_) => RHO_INF,
+            Self::Newmark(..) | Self::Hht(_) | Self::Lobatto => RHO_INF,
         };
         match name {
             name if name == self.name() => self,
@@ -53,6 +58,7 @@ impl SchemeWord {
             SchemeName::Hht => Self::Hht(ALPHA),
             SchemeName::GeneralizedAlpha => Self::GeneralizedAlpha(rho_inf),
             SchemeName::LieGeneralizedAlpha => Self::LieGeneralizedAlpha(rho_inf),
+            SchemeName::Lobatto => Self::Lobatto,
         }
     }
 }
@@ -67,6 +73,7 @@ impl SchemeName {
             Self::Newmark => &["beta", "gamma"],
             Self::Hht => &["alpha"],
             Self::GeneralizedAlpha | Self::LieGeneralizedAlpha => &["rho_inf"],
+            Self::Lobatto => &[],
         }
     }
 }
@@ -98,6 +105,7 @@ pub(super) fn read_scheme(table: &Table) -> Option<SchemeWord> {
         SchemeName::LieGeneralizedAlpha => {
             read_within(table, "rho_inf", RHO_INF, 1.0).map(SchemeWord::LieGeneralizedAlpha)
         }
+        SchemeName::Lobatto => Some(SchemeWord::Lobatto),
     }
 }
 

@@ -229,13 +229,15 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
     if composition.multipliers.is_empty() {
         return;
     }
-    use deck::SchemeWord::{GeneralizedAlpha, Hht, LieGeneralizedAlpha, Newmark};
+    use deck::SchemeWord::{GeneralizedAlpha, Hht, LieGeneralizedAlpha, Lobatto, Newmark};
     for stage in &deck.stages {
         let StageBody::Dynamic { scheme, .. } = stage.body else { continue };
         let undamped = match scheme {
             Newmark(_, gamma) => gamma <= 0.5,
             Hht(alpha) => alpha == 0.0,
             GeneralizedAlpha(rho) | LieGeneralizedAlpha(rho) => rho >= 1.0,
+            // Each step restores the rates of joints, but not those of stiff directions beside them.
+            Lobatto => !deck.beams.is_empty(),
         };
         if undamped {
             let message = "joints with Lagrange multipliers need a scheme with numerical dissipation: otherwise \

@@ -411,6 +411,7 @@ fn coefficients(scheme: SchemeWord) -> Scheme {
         SchemeWord::Hht(alpha) => Scheme::hht(alpha),
         SchemeWord::GeneralizedAlpha(rho) => Scheme::generalized_alpha(rho),
         SchemeWord::LieGeneralizedAlpha(rho) => Scheme::lie_generalized_alpha(rho),
+        SchemeWord::Lobatto => Scheme::lobatto(),
     }
 }
 

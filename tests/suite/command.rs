@@ -843,7 +843,7 @@ fn a_scheme_is_set_without_its_coefficients() {
     let folder = Folder::new("scheme");
     let swings = swinging(0.1).replace("step = 0.01", "step = 0.01\nscheme = \"generalized_alpha\"\nrho_inf = 0.5");
     folder.write("swings.toml", &swings);
-    for scheme in ["newmark", "hht", "lie_generalized_alpha", "generalized_alpha"] {
+    for scheme in ["newmark", "hht", "lobatto", "lie_generalized_alpha", "generalized_alpha"] {
         let output = folder.beamsim(&["run", "swings.toml", "--set", &format!("stage.0.scheme={scheme}")]);
         assert_eq!(status(&output), 0, "{scheme}: {}", last_line(&output));
     }

@@ -79,6 +79,38 @@ fn every_scheme_is_of_order_two_through_chart_switches() {
     }
 }
 
+#[test]
+fn lobatto_is_of_order_four_through_chart_switches() {
+    let run = |step: f64| simulate(&turned_rod(&format!("step = {step}\nscheme = \"lobatto\"")));
+    let [a, b, c] = [0.0025, 0.00125, 0.000625].map(run);
+    assert!(c.counters.work.chart_switches > 5, "{}", c.counters.work.chart_switches);
+    let [a, b, c] = [a, b, c].map(|simulation| simulation.vector("tip.u"));
+    let order = (distance(a, b) / distance(b, c)).log2();
+    assert!((order - 4.0).abs() < 0.7, "order {order}");
+}
+
+#[test]
+fn lobatto_is_of_order_four_for_a_free_body() {
+    let change = |a: [Vec3; 3], b: [Vec3; 3]| (0..3).map(|k| (a[k] - b[k]).max_abs()).fold(0.0, f64::max);
+    let run = |step: f64| FREE.simulate("lobatto", step, Vec3([0.3, 0.4, 0.5]));
+    let [a, b, c] = [0.04, 0.02, 0.01].map(run);
+    let order = (change(a, b) / change(b, c)).log2();
+    assert!((order - 4.0).abs() < 0.7, "order {order}");
+}
+
+/// Joints with multipliers: each step restores the rates that they allow.
+#[test]
+fn lobatto_is_of_order_four_with_joints() {
+    let deck = read("joints/body_double_pendulum_3d.toml");
+    let run = |step: f64| {
+        let settings = ["scheme=\"lobatto\"".into(), format!("step={step}"), "tolerance=1e-12".into()];
+        simulate(&with_settings(&deck, &settings.map(|setting: String| format!("stage.0.{setting}")))).vector("two.")
+    };
+    let [a, b, c] = [0.02, 0.01, 0.005].map(run);
+    let order = (distance(a, b) / distance(b, c)).log2();
+    assert!((order - 4.0).abs() < 0.7, "order {order}");
+}
+
 /// Steps h, 2h, h, 2h, … by hand: gravity is left out, so that the rod starts without acceleration.
 fn alternating(scheme: Scheme, h: f64) -> [f64; 3] {
     let text = turned_rod("step = 1").replace("gravity = [0, 0, -1]", "");
@@ -330,6 +362,31 @@ fn every_scheme_is_of_order_two_in_the_scenes_of_the_paper() {
             let order = (distance(a, b) / distance(b, c)).log2();
             assert!((order - 2.0).abs() < 0.4, "{deck}, {scheme}: order {order}");
         }
+    }
+}
+
+#[test]
+fn lobatto_is_of_order_four_in_the_scenes_of_the_paper() {
+    // Deck, settings, beams, end, first step, column. Steps hit the kinks of loads and motions; a softer section has no
+    // vibrations that they do not resolve.
+    let soft = ["section.leg.EA=1e4", "section.leg.GA=1e4"];
+    let scenes = [
+        ("top_rigid.toml", &[][..], 0, 0.6, 0.008, "pin.r"),
+        ("right_angle_coarse.toml", &soft, 2, 4.0, 0.0125, "tip.u"),
+        ("robot_arm.toml", &[], 2, 1.5, 0.0125, "tip.u"),
+    ];
+    for (deck, own, beams, end, step, column) in scenes {
+        let run = |h: f64| {
+            let mut settings: Vec<String> = own.iter().map(|setting| setting.to_string()).collect();
+            settings.extend([format!("stage.0.end={end}"), format!("stage.0.step={h}")]);
+            settings.push("stage.0.scheme=\"lobatto\"".into());
+            settings.push("stage.0.tolerance=1e-12".into());
+            settings.extend((0..beams).map(|k| format!("beam.{k}.interpolation=\"relative\"")));
+            paper(deck, &settings, column)
+        };
+        let [a, b, c] = [step, 0.5 * step, 0.25 * step].map(run);
+        let order = (distance(a, b) / distance(b, c)).log2();
+        assert!((order - 4.0).abs() < 0.6, "{deck}: order {order}");
     }
 }
 

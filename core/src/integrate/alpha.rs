@@ -35,6 +35,8 @@ pub struct Scheme {
     pub(crate) alpha_f: f64,
     /// The unknowns of rotations in a step
     pub rotations: Rotations,
+    /// The instants of a step at which there is balance
+    pub stages: Stages,
 }
 
 /// The unknowns of rotations in a step.
@@ -47,6 +49,15 @@ pub enum Rotations {
     Increments,
 }
 
+/// The instants of a step at which there is balance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+pub enum Stages {
+    /// The end
+    End,
+    /// The middle and the end, see [`super::Lobatto`], which uses none of the coefficients
+    MiddleAndEnd,
+}
+
 /// Factors of the local error below this, without unit, count as zero.
 const LEAST_ERROR_FACTOR: f64 = 1e-6;
 
@@ -54,13 +65,13 @@ impl Scheme {
     /// Newmark's family; beta = 1/4, gamma = 1/2 is the trapezoidal rule: second order, without
     /// dissipation.
     pub fn newmark(beta: f64, gamma: f64) -> Self {
-        Self { beta, gamma, alpha_m: 0.0, alpha_f: 0.0, rotations: Rotations::Totals }
+        Self { beta, gamma, alpha_m: 0.0, alpha_f: 0.0, rotations: Rotations::Totals, stages: Stages::End }
     }
 
     /// HHT-alpha with alpha in [0, 1/3]: second order, dissipates high frequencies.
     pub fn hht(alpha: f64) -> Self {
         let beta = 0.25 * (1.0 + alpha) * (1.0 + alpha);
-        Self { beta, gamma: 0.5 + alpha, alpha_m: 0.0, alpha_f: alpha, rotations: Rotations::Totals }
+        Self { gamma: 0.5 + alpha, alpha_f: alpha, ..Self::newmark(beta, 0.5) }
     }
 
     /// Generalised-alpha with the spectral radius rho in [0, 1] at infinite frequency: second
@@ -70,7 +81,7 @@ impl Scheme {
         let alpha_f = rho / (rho + 1.0);
         let gamma = 0.5 + alpha_f - alpha_m;
         let beta = 0.25 * (gamma + 0.5) * (gamma + 0.5);
-        Self { beta, gamma, alpha_m, alpha_f, rotations: Rotations::Totals }
+        Self { alpha_m, alpha_f, ..Self::newmark(beta, gamma) }
     }
 
     /// Generalised-alpha on increments of rotation (Bruls, Cardona & Arnold 2012,
@@ -78,6 +89,11 @@ impl Scheme {
     /// spectral radius rho in [0, 1] at infinite frequency.
     pub fn lie_generalized_alpha(rho: f64) -> Self {
         Self { rotations: Rotations::Increments, ..Self::generalized_alpha(rho) }
+    }
+
+    /// Lobatto IIIA with three stages: fourth order, without dissipation.
+    pub fn lobatto() -> Self {
+        Self { stages: Stages::MiddleAndEnd, ..Self::newmark(0.25, 0.5) }
     }
 
     /// The lag of the algorithmic acceleration in steps: it belongs to the time t + lag h.

@@ -4,11 +4,13 @@
 mod alpha;
 mod carried_error;
 mod increments;
+mod lobatto;
 mod predictor;
 mod time_error;
 
-pub use alpha::{Rotations, Scheme, Step};
+pub use alpha::{Rotations, Scheme, Stages, Step};
 pub use increments::Increments;
+pub use lobatto::{Lobatto, MIDDLE, Stage};
 pub use predictor::Predictor;
 pub use time_error::{Largest, StepEnds, TimeError};
 

@@ -122,18 +122,26 @@ impl Predictor {
 
     /// Adds the predicted correction to the scheme's prediction of a step.
     pub fn begin(&mut self, dof_map: &DofMap, state: &mut State, step: &Step, scratch: &mut [Vec3]) {
+        if self.foresee(dof_map, state, step.length, scratch) {
+            step.correct(state, scratch);
+        }
+    }
+
+    /// Predicts the correction of the scheme's prediction `state` for a step of a length; `false`
+    /// if nothing is foreseen.
+    pub fn foresee(&mut self, dof_map: &DofMap, state: &State, length: f64, correction: &mut [Vec3]) -> bool {
         self.predicted.resize(dof_map.count(), 0.0);
         dof_map.gather(|slot| state.q[slot], &mut self.predicted);
-        let Some(factors) = self.factors(step.length) else { return };
+        let Some(factors) = self.factors(length) else { return false };
         self.has_foreseen = true;
         let past: [_; ORDER] = self.corrections();
         let of = |equation| past.iter().zip(&factors).map(move |(past, factor)| past.get(equation)[0] * factor);
-        dof_map.scatter_found(|equation| of(equation).sum(), scratch);
-        step.correct(state, scratch);
+        dof_map.scatter_found(|equation| of(equation).sum(), correction);
+        true
     }
 
     /// Learns from a completed step, whose state must have the charts of its prediction.
-    pub fn end(&mut self, dof_map: &DofMap, state: &State, step: &Step) {
+    pub fn end(&mut self, dof_map: &DofMap, state: &State, length: f64) {
         let mut change = std::mem::take(&mut self.predicted);
         dof_map.gather_change(|slot| state.q[slot], &mut change);
         // The memory of a step that is no longer needed is used again.
@@ -141,7 +149,7 @@ impl Predictor {
         let mut correction = forgotten.unwrap_or_default().correction;
         correction.take(change.len(), |equation| [change[equation]]);
         dof_map.fill(|slot| self.weights[self.kinds[slot] as usize], &mut change);
-        self.learn(step.length, correction, &change);
+        self.learn(length, correction, &change);
         self.predicted = change;
     }
 

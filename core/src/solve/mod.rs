@@ -17,6 +17,7 @@ mod reuse;
 mod signature;
 mod soft_mode;
 mod softest;
+mod stages;
 mod stress_predictor;
 mod tangent;
 mod work;

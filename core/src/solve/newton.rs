@@ -28,7 +28,7 @@ pub struct Newton {
     pub max_iterations: usize,
     /// Linear solver
     pub solver: LinearSolver,
-    dq: Vec<Vec3>,
+    pub(super) dq: Vec<Vec3>,
     /// Size of the last correction of the current solution: `None` before the first, infinite after
     /// a change of chart
     last: Option<f64>,

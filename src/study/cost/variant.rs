@@ -214,6 +214,7 @@ pub(super) fn order_in_time(deck: &Deck, family: &Family) -> Option<Expected> {
         StageBody::Dynamic { scheme: SchemeWord::Newmark(_, gamma), .. } if family.scheme.is_none() && gamma != 0.5 => {
             1.0
         }
+        StageBody::Dynamic { scheme, .. } if family.scheme.unwrap_or(scheme.name()) == SchemeName::Lobatto => 4.0,
         StageBody::Dynamic { .. }
         | StageBody::Static { .. }
         | StageBody::Path { .. }

@@ -1,6 +1,6 @@
 //! Steps that adapt to their local error.
 
-use crate::integrate::{Increments, Scheme};
+use crate::integrate::{Increments, Scheme, Stages, StepEnds};
 use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
 use crate::system::State;
@@ -29,6 +29,9 @@ pub struct Control {
 const SAFETY: f64 = 0.9;
 /// A step grows at most by this, and shrinks at most by its reciprocal squared.
 const GROWTH: f64 = 2.0;
+/// Of steps with a stage in their middle: the factor of h^2 (a0 - 2 am + a1) in the error of a step
+/// that knows accelerations at its ends only, and takes a line for the parabola.
+const PARABOLA_FACTOR: f64 = 1.0 / 24.0;
 /// A step may shrink to this part of the first one.
 const SMALLEST: f64 = 1e-8;
 
@@ -72,32 +75,45 @@ impl Control {
     pub fn judge(&mut self, length: f64, error: f64) -> bool {
         let allowed = self.share(length);
         let ratio = (error / allowed).max(1e-9);
-        // The error of a step falls with the third power of its length, its share with the first.
-        let factor = SAFETY / libm::sqrt(ratio);
+        // The error of a step falls with the third power of its length, or with the fourth, its
+        // share with the first.
+        let root = match self.scheme.stages {
+            Stages::End => libm::sqrt(ratio),
+            Stages::MiddleAndEnd => libm::cbrt(ratio),
+        };
+        let factor = SAFETY / root;
         let taken = error <= allowed;
         let most = if taken { GROWTH } else { SAFETY };
         self.length = (length * factor.clamp(1.0 / (GROWTH * GROWTH), most)).max(self.smallest);
         taken
     }
 
-    /// The largest local error of a step and its slot, from the accelerations at its ends; both
-    /// states in one chart.
+    /// The largest local error of a step and its slot, from the accelerations at its ends, and in
+    /// its middle if that is a stage; all states in one chart.
     pub fn error(
         &self,
         model: &Model,
         increments: Option<&Increments>,
-        start: &State,
-        end: &State,
+        ends: StepEnds,
+        middle: Option<&State>,
         length: f64,
     ) -> (f64, usize) {
+        let StepEnds { from: start, to: end } = ends;
         // Without a factor the difference is no estimate; that of the trapezoidal rule keeps steps
         // sensible.
-        let factor = self.scheme.error_factor().unwrap_or(1.0 / 12.0).abs();
+        let factor = match self.scheme.stages {
+            Stages::End => self.scheme.error_factor().unwrap_or(1.0 / 12.0).abs(),
+            Stages::MiddleAndEnd => PARABOLA_FACTOR,
+        };
         let of_slot = |(slot, kind): (usize, &SlotKind)| {
             if !self.judged[slot] {
                 return (0.0, slot);
             }
-            let e = (end.a[slot] - start.a[slot]) * (factor * length * length);
+            let change = match middle {
+                None => end.a[slot] - start.a[slot],
+                Some(middle) => end.a[slot] - middle.a[slot] * 2.0 + start.a[slot],
+            };
+            let e = change * (factor * length * length);
             let size = match kind {
                 SlotKind::Displacement => e.norm() / model.length,
                 SlotKind::Rotation if increments.is_none() => (Rotation::new(end.q[slot]).t * e).norm(),

@@ -11,6 +11,8 @@ pub(in crate::run) struct DynamicsCheckpoint {
     /// The length of the last step
     pub last_length: f64,
     pub predictor: Predictor,
+    /// The predictor of the middle of steps, where that is a stage
+    pub of_middle: Option<Predictor>,
     pub massive: Vec<bool>,
     pub rateless: Vec<usize>,
     pub guard: Option<EnergyGuard>,

@@ -4,11 +4,14 @@ mod adaptive;
 pub(super) mod checkpoint;
 mod grid;
 mod judgement;
+mod middle;
 mod start;
+mod two_stages;
 
 use self::adaptive::Control;
 use self::checkpoint::{DynamicsCheckpoint, StepsCheckpoint};
 use self::grid::Grid;
+use self::middle::Middle;
 use super::checkpoint::AnalysisCheckpoint;
 use super::energy::{EnergyGuard, Growth};
 use super::failure::Failure;
@@ -37,6 +40,8 @@ pub(super) struct Dynamics<'s, 'r> {
     /// The unknowns of time steps where those are increments of rotation
     increments: Option<Increments>,
     predictor: Predictor,
+    /// The middle of steps, where that is a stage
+    middle: Option<Box<Middle>>,
     /// By slot: its accelerations mean something.
     massive: Vec<bool>,
     /// The slots whose velocities enter no force: they have neither inertia nor damping.
@@ -58,6 +63,7 @@ impl<'s, 'r> Dynamics<'s, 'r> {
             increments: has_increments
                 .then(|| Increments::new(stage.model, stage.schedule.kind(), &stage.assembly.system.pattern.dof_map)),
             predictor: Predictor::new(stage.model),
+            middle: Middle::of(settings.scheme, stage.model, stage.state),
             massive: Vec::new(),
             rateless: Vec::new(),
             guard,
@@ -117,9 +123,12 @@ impl Dynamics<'_, '_> {
 
     /// Takes up the stage where a checkpoint has left it.
     fn take_up(&mut self, checkpoint: DynamicsCheckpoint) -> StepsCheckpoint {
-        let DynamicsCheckpoint { last_length, predictor, massive, rateless, guard, steps } = checkpoint;
+        let DynamicsCheckpoint { last_length, predictor, of_middle, massive, rateless, guard, steps } = checkpoint;
         (self.last_length, self.massive, self.rateless, self.guard) = (last_length, massive, rateless, guard);
         self.predictor = predictor.of_model(self.stage.model);
+        if let (Some(middle), Some(predictor)) = (&mut self.middle, of_middle) {
+            middle.predictor = predictor.of_model(self.stage.model);
+        }
         match steps {
             // The deck may ask for rows at other instants now.
             StepsCheckpoint::Fixed { start, taken } if !self.lies_on_grid(start, taken) => {
@@ -137,11 +146,12 @@ impl Dynamics<'_, '_> {
 
     /// Shows the observer where the stage is, if it wants that.
     fn offer_checkpoint(&mut self, steps: impl FnOnce() -> StepsCheckpoint) -> Result<(), Failure> {
-        let Self { stage, last_length, predictor, massive, rateless, guard, .. } = self;
+        let Self { stage, last_length, predictor, middle, massive, rateless, guard, .. } = self;
         stage.offer_checkpoint(|| {
             AnalysisCheckpoint::Dynamics(DynamicsCheckpoint {
                 last_length: *last_length,
                 predictor: predictor.clone(),
+                of_middle: middle.as_ref().map(|middle| middle.predictor.clone()),
                 massive: massive.clone(),
                 rateless: rateless.clone(),
                 guard: guard.clone(),
@@ -155,8 +165,11 @@ impl Dynamics<'_, '_> {
         Step { scheme: self.settings.scheme, length: self.settings.step }
     }
 
-    /// The errors of fixed steps are estimated from here on.
+    /// The errors of fixed steps are estimated from here on, where they are of second order.
     fn follow_errors(&mut self) {
+        if self.middle.is_some() {
+            return;
+        }
         let first = self.first_step();
         let StageRun { assembly, newton, state, model, .. } = &mut *self.stage;
         let increments = self.increments.as_ref();
@@ -194,6 +207,7 @@ impl Dynamics<'_, '_> {
             self.tell_time(target)?;
             match self.advance(step, target) {
                 Ok(()) => {
+                    self.restore_rates()?;
                     self.last_length = step.length;
                     parts -= 1;
                     if parts == 0 {
@@ -231,7 +245,7 @@ impl Dynamics<'_, '_> {
         }
         let switched = self.stage.change_charts(totals.then_some(step.scheme.lag() * step.length));
         if totals && switched > 0 {
-            self.predictor.forget();
+            self.each_predictor(Predictor::forget);
         }
     }
 
@@ -248,8 +262,9 @@ impl Dynamics<'_, '_> {
             let taken = match tried {
                 Ok(()) => {
                     let increments = self.increments.as_ref();
-                    let (error, slot) =
-                        control.error(self.stage.model, increments, self.stage.good, self.stage.state, length);
+                    let middle = self.middle.as_ref().map(|middle| &middle.state);
+                    let ends = StepEnds { from: self.stage.good, to: self.stage.state };
+                    let (error, slot) = control.error(self.stage.model, increments, ends, middle, length);
                     let taken = control.judge(length, error);
                     if !taken && at_floor {
                         let failure = NewtonFailure::StepTooSmall { slot, error, share: control.share(length) };
@@ -262,6 +277,7 @@ impl Dynamics<'_, '_> {
                 Err(_) => control.fail(length),
             };
             if taken {
+                self.restore_rates()?;
                 self.last_length = length;
                 if self.complete(&step)? {
                     return Ok(());
@@ -270,7 +286,7 @@ impl Dynamics<'_, '_> {
                 // shorter one must jump to bring them back, more and more the shorter it is.
                 self.close_joints()?;
             } else {
-                self.predictor.withdraw();
+                self.each_predictor(Predictor::withdraw);
                 self.stage.state.copy_from(self.stage.good);
                 self.stage.counters.cutbacks += 1;
             }
@@ -281,27 +297,35 @@ impl Dynamics<'_, '_> {
     /// One attempt at a step; what was foreseen of it may not be what it fails for.
     fn advance(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
         self.stage.good.copy_from(self.stage.state);
-        self.predictor.reset();
+        self.each_predictor(Predictor::reset);
         let mut result = self.attempt_step(step, next);
         if result.is_err() && self.predictor.has_foreseen() {
-            self.predictor.fail();
+            self.each_predictor(Predictor::fail);
             self.stage.state.copy_from(self.stage.good);
             result = self.attempt_step(step, next);
         }
         if result.is_err() {
             // It may have come to an end that is refused.
-            self.predictor.fail();
+            self.each_predictor(Predictor::fail);
         }
         result
     }
 
+    fn each_predictor(&mut self, work: impl Fn(&mut Predictor)) {
+        let of_middle = self.middle.as_mut().map(|middle| &mut middle.predictor);
+        std::iter::once(&mut self.predictor).chain(of_middle).for_each(work);
+    }
+
     /// Predict, prescribe, iterate.
     fn attempt_step(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
-        self.predict(step, next)?;
-        let StageRun { assembly, newton, state, model, counters, .. } = &mut *self.stage;
-        self.predictor.begin(&assembly.system.pattern.dof_map, state, &step, newton.scratch());
-        newton.solve(model, assembly, state, &step, None, &mut counters.work)?;
-        self.predictor.end(&assembly.system.pattern.dof_map, state, &step);
+        match self.middle.take() {
+            None => self.find_end(step, next)?,
+            Some(mut middle) => {
+                let found = self.find_stages(&mut middle, step.length, next);
+                self.middle = Some(middle);
+                found?;
+            }
+        }
         self.refuse_massless_turns()?;
         self.settle_rates(&step);
         self.refuse_turns(step.length)?;
@@ -309,6 +333,16 @@ impl Dynamics<'_, '_> {
         self.stage.refuse_passing()?;
         let StageRun { assembly, newton, state, good, .. } = &mut *self.stage;
         newton.end_step(&assembly.system, StepEnds { from: good, to: state }, &step, self.increments.as_ref());
+        Ok(())
+    }
+
+    /// Finds the balance at the end of a step.
+    fn find_end(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
+        self.predict(step, next)?;
+        let StageRun { assembly, newton, state, model, counters, .. } = &mut *self.stage;
+        self.predictor.begin(&assembly.system.pattern.dof_map, state, &step, newton.scratch());
+        newton.solve(model, assembly, state, &step, None, &mut counters.work)?;
+        self.predictor.end(&assembly.system.pattern.dof_map, state, step.length);
         Ok(())
     }
 

@@ -58,8 +58,8 @@ impl Dynamics<'_, '_> {
         begins
     }
 
-    /// Sets the clock; motors must not jump.
-    fn set_clock(&mut self) -> Result<(), Failure> {
+    /// Sets the clock, and all accelerations but prescribed ones to zero; motors must not jump.
+    pub(super) fn set_clock(&mut self) -> Result<(), Failure> {
         let StageRun { model, state, schedule, .. } = &mut *self.stage;
         state.a.fill(Vec3::ZERO);
         let (time, amplitude) = (state.time, state.amplitude.clone());
@@ -117,6 +117,18 @@ impl Dynamics<'_, '_> {
     }
 
     fn solve_accelerations(&mut self) -> Result<(), Failure> {
+        if !self.find_accelerations()? {
+            self.stage.warn(
+                WarningKind::NoStartAccelerations,
+                "the mass matrix is singular, so that the accelerations at the start are undefined (a point mass with \
+                 an offset and without inertia?): they are set to zero",
+            );
+        }
+        Ok(())
+    }
+
+    /// Accelerations and multipliers from equilibrium; `false` where the mass matrix is singular.
+    pub(super) fn find_accelerations(&mut self) -> Result<bool, Failure> {
         let StageRun { assembly, state, .. } = &mut *self.stage;
         assembly.forget();
         let [_, rates2] = assembly.drift(state);
@@ -126,13 +138,8 @@ impl Dynamics<'_, '_> {
             return Err(self.stage.name_failure(failure, &self.stage.assembly.system));
         }
         let Some(solved) = self.solve_with_mass(&rates2)? else {
-            self.stage.warn(
-                WarningKind::NoStartAccelerations,
-                "the mass matrix is singular, so that the accelerations at the start are undefined (a point mass with \
-                 an offset and without inertia?): they are set to zero",
-            );
             self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
-            return Ok(());
+            return Ok(false);
         };
         let StageRun { model, state, .. } = &mut *self.stage;
         for (slot, kind) in model.kinds.iter().enumerate() {
@@ -141,7 +148,7 @@ impl Dynamics<'_, '_> {
         }
         // The forces of the start, for reactions and the energy account.
         self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
-        Ok(())
+        Ok(true)
     }
 
     /// Solves with the mass matrix, bordered by the gaps of joints, whose rows ask for -`gaps`;

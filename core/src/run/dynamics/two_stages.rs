@@ -1,0 +1,56 @@
+//! Time steps with a stage in their middle.
+
+use super::Dynamics;
+use super::middle::Middle;
+use crate::integrate::{Lobatto, MIDDLE, Stage};
+use crate::run::failure::Failure;
+use crate::run::stage_run::StageRun;
+use crate::solve::NewtonFailure;
+
+impl Dynamics<'_, '_> {
+    /// Predicts both stages of a step, puts prescribed directions where they belong, and finds the
+    /// balance of both.
+    pub(super) fn find_stages(&mut self, middle: &mut Middle, length: f64, next: f64) -> Result<(), NewtonFailure> {
+        let StageRun { assembly, newton, state, model, schedule, counters, .. } = &mut *self.stage;
+        let step = Lobatto { length };
+        let Middle { state: middle, predictor } = middle;
+        if !self.rateless.is_empty() {
+            model.steady(state);
+        }
+        middle.copy_from(state);
+        step.predict(middle, state);
+        let dof_map = &assembly.system.pattern.dof_map;
+        for stage in [Stage::Middle, Stage::End] {
+            let (predictor, predicted) = match stage {
+                Stage::Middle => (&mut *predictor, &*middle),
+                Stage::End => (&mut self.predictor, &**state),
+            };
+            if predictor.foresee(dof_map, predicted, length, newton.scratch()) {
+                step.correct(middle, state, stage, newton.scratch(), 1.0);
+            }
+        }
+        let start = state.time;
+        for (state, time) in [(&mut *middle, start + MIDDLE * length), (&mut **state, next)] {
+            if let Some((slot, angle)) = schedule.set_clock(model, state, time, 1.0) {
+                return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
+            }
+        }
+        newton.solve_stages(model, assembly, middle, state, &step, &mut counters.work)?;
+        let dof_map = &assembly.system.pattern.dof_map;
+        predictor.end(dof_map, middle, length);
+        self.predictor.end(dof_map, state, length);
+        Ok(())
+    }
+
+    /// Gives velocities and accelerations that the gaps of joints allow to a step that is taken.
+    /// Stages close the gaps themselves; errors of their rates would add up.
+    pub(super) fn restore_rates(&mut self) -> Result<(), Failure> {
+        if self.middle.is_some() && !self.stage.model.multipliers.is_empty() {
+            // Accelerations are those of prescribed motions, to which the solution is added.
+            self.set_clock()?;
+            self.close_joints()?;
+            self.find_accelerations()?;
+        }
+        Ok(())
+    }
+}
