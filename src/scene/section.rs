@@ -70,11 +70,7 @@ impl SectionCourse {
             }
             Self::Rigid(course, strains) => {
                 let section = course.at(s);
-                // D C D scales what the flexibility C^-1 has of these strains, and what it couples
-                // them with.
-                let scale = strains.map(|rigid| if rigid { RIGID.sqrt() } else { 1.0 });
-                let entry = |i: usize, j: usize| section.stiffness[i][j] * scale[i] * scale[j];
-                let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
+                let stiffness = stiffened(&section.stiffness, strains);
                 SectionMatrices { stiffness, ..section }
             }
         }
@@ -107,6 +103,24 @@ impl SectionCourse {
         }
         Self::Rigid(Box::new(self), [!extension, !shear, !shear, false, false, false])
     }
+}
+
+/// A stiffness K that is [`RIGID`] times as stiff against some strains F and has the same compliance
+/// in the others R, so that centres, torsion and bending stay: K + (RIGID - 1) K_.F K_FF^-1 K_F.
+/// divides by RIGID what of the compliance S_FF is due to F alone, K_FF^-1.
+fn stiffened(stiffness: &[[f64; 6]; 6], strains: &[bool; 6]) -> [[f64; 6]; 6] {
+    let of =
+        |i: usize, j: usize| if strains[i] && strains[j] { stiffness[i][j] } else { f64::from(i == j && !strains[i]) };
+    let block = Matrix6::from_fn(of);
+    let coupling = Matrix6::from_fn(|i, j| if strains[i] && !strains[j] { stiffness[i][j] } else { 0.0 });
+    let Some(within) = block.cholesky().map(|factor| coupling.transpose() * factor.solve(&coupling)) else {
+        return *stiffness;
+    };
+    let entry = |i: usize, j: usize| match (strains[i], strains[j]) {
+        (false, false) => stiffness[i][j] + (RIGID - 1.0) * within[(i, j)],
+        (true, _) | (_, true) => RIGID * stiffness[i][j],
+    };
+    std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
 }
 
 fn mix(a: f64, b: f64, s: f64) -> f64 {
@@ -406,6 +420,26 @@ impl Closed {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stiffened_strains_keep_centres_torsion_and_bending() {
+        // A symmetric positive definite matrix that couples all strains.
+        let root = Matrix6::from_fn(|i, j| if i == j { 3.0 } else { ((7 * i + 5 * j) as f64).sin() });
+        let plain = root * root.transpose();
+        let rows = std::array::from_fn(|i| std::array::from_fn(|j| plain[(i, j)]));
+        for strains in [[true, false, false, false, false, false], [false, true, true, false, false, false]] {
+            let stiff = stiffened(&rows, &strains);
+            let stiff = Matrix6::from_fn(|i, j| stiff[i][j]);
+            let [before, after] = [plain, stiff].map(|matrix| matrix.try_inverse().expect("it is positive definite"));
+            for (i, j) in (0..36).map(|k| (k / 6, k % 6)) {
+                if !(strains[i] && strains[j]) {
+                    assert!((after[(i, j)] - before[(i, j)]).abs() < 1e-12, "{strains:?} {i} {j}");
+                } else {
+                    assert!((stiff[(i, j)] - RIGID * plain[(i, j)]).abs() < 1e-12 * RIGID, "{strains:?} {i} {j}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn torsion_of_rectangles_agrees_with_the_published_table() {
