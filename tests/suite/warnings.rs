@@ -195,3 +195,14 @@ fn a_sweep_tells_the_warnings_of_its_points() {
     assert_eq!(table.matches("warning[branch_point]: ").count(), 2, "{table}");
     assert_eq!(table.matches("; also unstable").count(), 2, "{table}");
 }
+
+/// Under a scheme that restores the rates of joints after each step, rigid bodies need no dissipation; beams do.
+#[test]
+fn lobatto_is_warned_of_where_beams_have_joints_with_multipliers() {
+    let decks = [("decks/joints/body_double_pendulum.toml", false), ("decks/joints/four_bar_revolute.toml", true)];
+    for (deck, is_told) in decks {
+        let text = beamsim::deck::apply(&file(deck), &["stage.0.scheme=\"lobatto\"".into()]).unwrap();
+        let (_, diagnostics) = beamsim::scene::from_text(&text).unwrap_or_else(|e| panic!("{e:?}"));
+        assert_eq!(format!("{diagnostics:?}").contains("UndampedMultipliers"), is_told, "{deck}: {diagnostics:?}");
+    }
+}
