@@ -147,7 +147,7 @@ nodes = ["tip"]
 surfaces = ["shell", "ball", "roller"]
 radius = { a = 0.1, b = 0.15, tip = 0.2 }
 stiffness = 5
-friction = [0.2, 0.4]
+friction = 0.3
 damping = 0.1
 "#;
 

@@ -65,7 +65,8 @@ fn keys_are_explained_and_wrong_ones_told() {
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(status(&output) == 0 && told.iter().all(|told| text.contains(told)), "{name}: {text}");
     }
-    assert!(last_line(&folder.beamsim(&["explain", "contact"])).contains("contact is not supported yet"));
+    let collision = folder.beamsim(&["explain", "collision"]);
+    assert!(last_line(&collision).contains("contacts of beams and bodies with surfaces are [[contact]]"));
     let wrong = folder.beamsim(&["explain", "elemnts"]);
     assert_eq!((status(&wrong), last_line(&wrong).contains("did you mean `elements`?")), (2, true));
 }
