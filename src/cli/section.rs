@@ -52,6 +52,7 @@ fn all(wanted: &SectionArguments) -> Result<(), CommandError> {
     let deck = &read.deck;
     let units = Units::of_deck(&deck.resolved);
     let folder = folders::folder(wanted.out.as_deref(), &load::name(path), false);
+    let mut warnings = Vec::new();
     for section in chosen(deck, &wanted.names)? {
         let matrices = scene::section_matrices(section, deck).map_err(|found| read.refuse(path, &[found]))?;
         let solved = scene::solved(section, deck).transpose().map_err(|found| read.refuse(path, &[found]))?;
@@ -62,8 +63,9 @@ fn all(wanted: &SectionArguments) -> Result<(), CommandError> {
             None => Vec::new(),
         };
         json::section(&report.summary(path, &pictures));
+        warnings.extend(scene::section_warning(section, deck));
     }
-    Ok(())
+    read.warn(path, warnings)
 }
 
 /// The sections with the given names; all without names.

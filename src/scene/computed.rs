@@ -96,7 +96,9 @@ fn solve(section: &deck::Section, body: &ComputedSection, deck: &Deck) -> Result
     let closed = Closed { stiffness: analysis.solution.stiffness, mass: analysis.solution.mass };
     let place = draft.place(&analysis);
     let solution = Solution { analysis, materials: draft.materials.clone() };
-    Ok(draft.placed(Some((solution, place)), closed))
+    let found = draft.placed(Some((solution, place)), closed);
+    section::within_range(found.matrices.clone(), section)?;
+    Ok(found)
 }
 
 /// A warning about a section whose error is large, or larger than it was to be.

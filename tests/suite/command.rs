@@ -314,6 +314,19 @@ fn section_shows_numbers_and_draws() {
     assert_eq!((status(&output), last_line(&output).contains("no section `bax`")), (2, true));
 }
 
+#[test]
+fn section_warns_of_coarse_meshes() {
+    let folder = Folder::new("coarse_section");
+    let flat = "[material.m]\nE = 1\nnu = 0.3\n[section.flat]\nshape = \"ellipse\"\nmaterial = \"m\"\n\
+                width = 100\nheight = 1\nmesh = { size = 1000 }\n";
+    folder.write("deck.toml", flat);
+    let output = folder.beamsim(&["section", "deck.toml"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!((status(&output), errors.contains("warning[coarse_section]")), (0, true), "{errors}");
+    let output = folder.beamsim(&["section", "deck.toml", "--deny-warnings"]);
+    assert!(status(&output) != 0 && last_line(&output).contains("1 warning(s)"), "{}", last_line(&output));
+}
+
 /// The first step on offer fails in two steps of five, and takes three times the iterations of half of it.
 #[test]
 fn a_search_gives_up_steps_that_fail() {
