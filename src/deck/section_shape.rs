@@ -579,7 +579,13 @@ fn read_shape(table: &Table, kind: ShapeWord, layups: &[String]) -> Option<Compu
         }
         ShapeWord::Ellipse => {
             let (width, height) = pair("width", "height")?;
-            ComputedShape::Ellipse { size: [width, height], thickness: optional("thickness")? }
+            let thickness = optional("thickness")?;
+            if thickness.is_some_and(|thickness| 2.0 * thickness >= width.min(height)) {
+                let message = "`thickness` must be less than half of `width` and of `height`: leave it out for a \
+                               solid ellipse";
+                return table.wrong_key("thickness", message);
+            }
+            ComputedShape::Ellipse { size: [width, height], thickness }
         }
         ShapeWord::I => {
             let body = flanged()?;
