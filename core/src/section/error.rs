@@ -144,7 +144,7 @@ impl fmt::Display for SectionError {
             Self::InvertedElement { region, at } => write!(
                 out,
                 "the mesh of region `{region}` has a folded element near {}: a curved edge comes too close to \
-                 another edge. Use a finer mesh",
+                 another edge. Usually a wall or skin is thicker than its radius or than half of the room for it",
                 show(*at)
             ),
             Self::Singular => {

@@ -137,6 +137,7 @@ impl Boundaries {
                 std::iter::once((false, &planar.outline)).chain(planar.holes.iter().map(|hole| (true, hole)))
             {
                 let area = outline.area();
+                check_own_sides(outline)?;
                 if area.abs() <= 1e-12 * outline.size().powi(2) || !area.is_finite() {
                     let message = "has no area".to_string();
                     return Err(SectionError::Outline { region: planar.region.name.clone(), message });
@@ -365,6 +366,20 @@ impl Boundaries {
     }
 }
 
+/// Refuses an outline whose straight sides cross each other, which may have no area.
+fn check_own_sides(outline: &Outline) -> Result<(), SectionError> {
+    let is_line = |side: &usize| outline.sides[*side] == Side::Line;
+    let lines: Vec<[Point; 2]> = (0..outline.sides.len()).filter(is_line).map(|side| outline.ends(side)).collect();
+    for (k, &first) in lines.iter().enumerate() {
+        for &second in &lines[k + 1..] {
+            if lines_cross(first, second, SAME_POINT * outline.size()) {
+                return Err(SectionError::CrossingEdges { first, second });
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Divided boundaries.
 #[derive(Default)]
 struct Chords {
@@ -461,6 +476,11 @@ fn triangulate(regions: &[PlanarRegion], chords: &Chords, sizes: &Sizes) -> Resu
     Err(SectionError::Meshing { region, message })
 }
 
+/// The message where the mesh generator takes no coordinate of a point.
+fn out_of_range() -> String {
+    "its coordinates are too large or too small for the mesh generator: use another unit of length".to_string()
+}
+
 /// Triangulates and refines; `None` if refinement does not end.
 fn triangulate_with(
     regions: &[PlanarRegion],
@@ -473,7 +493,7 @@ fn triangulate_with(
     let mut triangulation = Delaunay::new();
     let mut handles = Vec::new();
     for at in &chords.vertices {
-        handles.push(triangulation.insert(Point2::new(at[0], at[1])).map_err(|error| failed(error.to_string()))?);
+        handles.push(triangulation.insert(Point2::new(at[0], at[1])).map_err(|_| failed(out_of_range()))?);
     }
     for (ends, chord) in chords.edges.iter().zip(&chords.list) {
         let [from, to] = ends.map(|end| handles[end]);
