@@ -298,13 +298,13 @@ fn without_round_off(at: Point, size: f64) -> Point {
     at.map(|x| if x.abs() < 1e-9 * size { 0.0 } else { x })
 }
 
-/// A number with ten digits.
+/// A number with seven digits; with a power of ten if it is large or small.
 fn digits(value: f64) -> String {
     if value == 0.0 {
         return "0.0".into();
     }
-    let rounded: f64 = format!("{value:.9e}").parse().unwrap_or(value);
-    format!("{rounded:?}")
+    let rounded: f64 = format!("{value:.6e}").parse().unwrap_or(value);
+    if (1e-4..1e7).contains(&rounded.abs()) { format!("{rounded:?}") } else { format!("{rounded:e}") }
 }
 
 /// The name of the picture of a section: that of the section, with a number if pictures of sections
