@@ -109,7 +109,8 @@ impl<'a> Report<'a> {
         units: &'a Units,
     ) -> Self {
         let stiffness = Matrix6::from_fn(|i, j| matrices.stiffness[i][j]);
-        let properties = spd_inverse(&stiffness).map(|compliance| Properties::new(&compliance));
+        let compliance = solved.and_then(|solved| solved.compliance).or_else(|| spd_inverse(&stiffness));
+        let properties = compliance.map(|compliance| Properties::new(&compliance));
         Self { name: &section.name.value, stiffness, mass: mass_matrix(matrices), properties, solved, units }
     }
 
@@ -159,7 +160,7 @@ impl<'a> Report<'a> {
 
     /// Shear stiffness over that of uniform shear, for sections of one isotropic material.
     fn print_shear_coefficients(&self, solution: Option<&Solution>, ga: [f64; 2]) {
-        let Some(Solution { analysis, materials }) = solution else { return };
+        let Some(Solution { analysis, materials, .. }) = solution else { return };
         let [material] = &materials[..] else { return };
         let Some(shear) = material.shear_modulus() else { return };
         let coefficients = ga.map(|ga| ga / (shear * analysis.solution.area));
@@ -231,8 +232,10 @@ const MASS_PER_LENGTH: Dimension = Dimension { angle: 0, length: -2, force: 1, t
 fn draw(report: &Report, solution: &Solution, folder: &Path, file: &str) -> Result<Vec<PathBuf>, CommandError> {
     let analysis = &solution.analysis;
     let centres = analysis.properties();
+    let place = report.solved.map_or([0.0; 2], |solved| solved.place);
+    let line = [place[0] - solution.origin[0], place[1] - solution.origin[1]];
     let mut points = vec![
-        ("line of the beam", report.solved.map_or([0.0; 2], |solved| solved.place)),
+        ("line of the beam", line),
         ("centroid", analysis.solution.centroid),
         ("tension centre", centres.tension_centre),
         ("shear centre", centres.shear_centre),

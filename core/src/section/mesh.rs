@@ -333,3 +333,17 @@ impl UnionFind {
         self.parent[root.max(other)] = root.min(other);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_one_direction_cover_each_other() {
+        let line = |from: f64, to: f64, height: f64| [[from, height], [to, height]];
+        let covers = |second: [Point; 2]| lines_cover(line(0.0, 2.0, 0.0), second, 1e-9);
+        assert!(covers(line(1.0, 3.0, 0.0)) && covers(line(0.5, 1.5, 0.0)) && covers(line(-1.0, 3.0, 0.0)));
+        // Faces that touch have opposite directions; neighbours on a face have a common point.
+        assert!(!covers(line(3.0, 1.0, 0.0)) && !covers(line(2.0, 3.0, 0.0)) && !covers(line(0.0, 2.0, 1e-3)));
+    }
+}

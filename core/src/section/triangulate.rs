@@ -137,8 +137,8 @@ impl Boundaries {
                 std::iter::once((false, &planar.outline)).chain(planar.holes.iter().map(|hole| (true, hole)))
             {
                 let area = outline.area();
-                check_own_sides(outline)?;
                 if area.abs() <= 1e-12 * outline.size().powi(2) || !area.is_finite() {
+                    check_own_sides(outline)?;
                     let message = "has no area".to_string();
                     return Err(SectionError::Outline { region: planar.region.name.clone(), message });
                 }
@@ -368,11 +368,12 @@ impl Boundaries {
 
 /// Refuses an outline whose straight sides cross each other, which may have no area.
 fn check_own_sides(outline: &Outline) -> Result<(), SectionError> {
+    let tolerance = SAME_POINT * outline.size();
     let is_line = |side: &usize| outline.sides[*side] == Side::Line;
     let lines: Vec<[Point; 2]> = (0..outline.sides.len()).filter(is_line).map(|side| outline.ends(side)).collect();
     for (k, &first) in lines.iter().enumerate() {
         for &second in &lines[k + 1..] {
-            if lines_cross(first, second, SAME_POINT * outline.size()) {
+            if lines_cross(first, second, tolerance) {
                 return Err(SectionError::CrossingEdges { first, second });
             }
         }
