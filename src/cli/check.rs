@@ -11,6 +11,8 @@ use crate::study::forecast::{Forecast, forecast};
 use beamsim_core::model::beam_element::{ElementGeometry, Rule};
 use beamsim_core::model::{Assembly, EffectSize, Schedule, SectionMatrices};
 use beamsim_core::run::{Failure, Moment, refusal};
+use beamsim_core::section::Matrix6;
+use beamsim_core::section::saint_venant::spd_inverse;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::threads;
 use std::path::{Path, PathBuf};
@@ -146,7 +148,12 @@ fn number(value: f64) -> String {
 
 /// A positive number with three digits.
 fn rounded(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
+    rounded_to(3, value)
+}
+
+/// A number with some digits.
+fn rounded_to(digits: usize, value: f64) -> f64 {
+    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }
 
 fn print_beams(mesh: &Mesh) {
@@ -178,7 +185,7 @@ fn print_section(section: &SectionMatrices, place: &str) {
         number(k[0][0]),
         number(k[1][1]),
         number(k[2][2]),
-        number(k[3][3]),
+        number(torsional_stiffness(section)),
         number(k[4][4]),
         number(k[5][5])
     ));
@@ -197,6 +204,17 @@ fn print_section(section: &SectionMatrices, place: &str) {
             mass.offset.0
         ));
     }
+}
+
+/// Stiffness under a torque alone, 1/S44: not K44, which contains the distance to the shear centre.
+fn torsional_stiffness(section: &SectionMatrices) -> f64 {
+    let k = section.stiffness;
+    let is_coupled = (0..6).any(|j| j != 3 && k[3][j] != 0.0);
+    if !is_coupled {
+        return k[3][3];
+    }
+    let stiffness = Matrix6::from_fn(|i, j| k[i][j]);
+    spd_inverse(&stiffness).map_or(k[3][3], |compliance| rounded_to(10, 1.0 / compliance[(3, 3)]))
 }
 
 /// Prints mass, centre, and inertia about the centre in the initial placement. Moments are summed

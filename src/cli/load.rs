@@ -47,20 +47,27 @@ pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Comm
     let built = scene::from_deck(&deck, found);
     let refuse = |found: Vec<Diagnostic>| refusal(path, &label, &text, &found, expected_failures(&deck));
     let (scene, warnings) = built.map_err(refuse)?;
+    show_warnings(path, &label, &text, warnings)?;
+    let source = source(path, &own, &text, tables);
+    Ok(Loaded { text, source, deck, scene })
+}
+
+/// Shows the warnings that are new; they are an error with `--deny-warnings`.
+fn show_warnings(path: &Path, label: &str, text: &str, warnings: Vec<Diagnostic>) -> Result<(), CommandError> {
     if !warnings.is_empty() && console::denies_warnings() {
-        let (count, path) = (warnings.len(), path.display());
+        let count = warnings.len();
+        let path = path.display();
         return Err(CommandError::Deck(DeckError {
             message: format!("{count} warning(s) in {path}, which --deny-warnings treats as errors"),
-            details: render(&label, &text, &warnings),
+            details: render(label, text, &warnings),
             ..DeckError::default()
         }));
     }
     let new: Vec<Diagnostic> = warnings.into_iter().filter(|warning| console::is_new(path, &warning.message)).collect();
     if !new.is_empty() {
-        console::diagnostics(&render(&label, &text, &new));
+        console::diagnostics(&render(label, text, &new));
     }
-    let source = source(path, &own, &text, tables);
-    Ok(Loaded { text, source, deck, scene })
+    Ok(())
 }
 
 /// A deck without its scene.
@@ -78,6 +85,11 @@ pub struct ReadDeck {
 }
 
 impl ReadDeck {
+    /// Shows warnings about the deck; they are its error with `--deny-warnings`.
+    pub fn warn(&self, path: &Path, warnings: Vec<Diagnostic>) -> Result<(), CommandError> {
+        show_warnings(path, &self.label, &self.imported.text, warnings)
+    }
+
     /// The error that shows messages about the deck.
     pub fn refuse(&self, path: &Path, found: &[Diagnostic]) -> CommandError {
         refusal(path, &self.label, &self.imported.text, found, Vec::new())

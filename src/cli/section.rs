@@ -12,6 +12,7 @@ use beamsim_core::probe::Dimension;
 use beamsim_core::section::properties::{Properties, mass_centre};
 use beamsim_core::section::saint_venant::spd_inverse;
 use beamsim_core::section::{Matrix6, Point};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Shear coefficients of one material below this deserve a remark
@@ -52,18 +53,21 @@ fn all(wanted: &SectionArguments) -> Result<(), CommandError> {
     let deck = &read.deck;
     let units = Units::of_deck(&deck.resolved);
     let folder = folders::folder(wanted.out.as_deref(), &load::name(path), false);
+    let mut warnings = Vec::new();
     for section in chosen(deck, &wanted.names)? {
         let matrices = scene::section_matrices(section, deck).map_err(|found| read.refuse(path, &[found]))?;
         let solved = scene::solved(section, deck).transpose().map_err(|found| read.refuse(path, &[found]))?;
         let report = Report::new(section, &matrices, solved.as_ref(), &units);
         report.print();
+        let picture = picture_name(&section.name.value, deck);
         let pictures = match solved.as_ref().and_then(|solved| solved.solution.as_ref()) {
-            Some(solution) => draw(&report, solution, &folder)?,
+            Some(solution) => draw(&report, solution, &folder, &picture)?,
             None => Vec::new(),
         };
         json::section(&report.summary(path, &pictures));
+        warnings.extend(scene::section_warning(section, deck));
     }
-    Ok(())
+    read.warn(path, warnings)
 }
 
 /// The sections with the given names; all without names.
@@ -105,7 +109,8 @@ impl<'a> Report<'a> {
         units: &'a Units,
     ) -> Self {
         let stiffness = Matrix6::from_fn(|i, j| matrices.stiffness[i][j]);
-        let properties = spd_inverse(&stiffness).map(|compliance| Properties::new(&compliance));
+        let compliance = solved.and_then(|solved| solved.compliance).or_else(|| spd_inverse(&stiffness));
+        let properties = compliance.map(|compliance| Properties::new(&compliance));
         Self { name: &section.name.value, stiffness, mass: mass_matrix(matrices), properties, solved, units }
     }
 
@@ -155,7 +160,7 @@ impl<'a> Report<'a> {
 
     /// Shear stiffness over that of uniform shear, for sections of one isotropic material.
     fn print_shear_coefficients(&self, solution: Option<&Solution>, ga: [f64; 2]) {
-        let Some(Solution { analysis, materials }) = solution else { return };
+        let Some(Solution { analysis, materials, .. }) = solution else { return };
         let [material] = &materials[..] else { return };
         let Some(shear) = material.shear_modulus() else { return };
         let coefficients = ga.map(|ga| ga / (shear * analysis.solution.area));
@@ -224,11 +229,13 @@ impl<'a> Report<'a> {
 const MASS_PER_LENGTH: Dimension = Dimension { angle: 0, length: -2, force: 1, time: 2 };
 
 /// Draws a section; gives the paths of the pictures.
-fn draw(report: &Report, solution: &Solution, folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
+fn draw(report: &Report, solution: &Solution, folder: &Path, file: &str) -> Result<Vec<PathBuf>, CommandError> {
     let analysis = &solution.analysis;
     let centres = analysis.properties();
+    let place = report.solved.map_or([0.0; 2], |solved| solved.place);
+    let line = [place[0] - solution.origin[0], place[1] - solution.origin[1]];
     let mut points = vec![
-        ("line of the beam", report.solved.map_or([0.0; 2], |solved| solved.place)),
+        ("line of the beam", line),
         ("centroid", analysis.solution.centroid),
         ("tension centre", centres.tension_centre),
         ("shear centre", centres.shear_centre),
@@ -253,8 +260,8 @@ fn draw(report: &Report, solution: &Solution, folder: &Path) -> Result<Vec<PathB
     };
     outputs::check_folder(folder, &[])?;
     let mut paths = Vec::new();
-    for (kind, picture) in [("", of_materials), ("-warping", of_warping)] {
-        let path = folder.join(format!("{}{kind}.svg", file_name(name)));
+    for (kind, picture) in [("", of_materials), (WARPING, of_warping)] {
+        let path = folder.join(format!("{file}{kind}.svg"));
         outputs::check_file(&path, OutputKind::Svg)?;
         PartFile::write_to(&path, picture.to_svg().as_bytes())?;
         console::line(&format!("{}", path.display()));
@@ -279,10 +286,11 @@ fn mass_matrix(matrices: &SectionMatrices) -> Option<Matrix6> {
     }))
 }
 
-/// Rows of a matrix as TOML.
+/// Rows of a matrix as TOML, with the fewest digits that give the same numbers. Adding zero makes -0
+/// and 0 one.
 fn rows(matrix: &Matrix6) -> String {
     let row = |i: usize| {
-        let entries: Vec<String> = (0..6).map(|j| digits(matrix[(i, j)])).collect();
+        let entries: Vec<String> = (0..6).map(|j| format!("{:?}", matrix[(i, j)] + 0.0)).collect();
         format!("  [{}],\n", entries.join(", "))
     };
     format!("[\n{}]", (0..6).map(row).collect::<String>())
@@ -293,14 +301,35 @@ fn without_round_off(at: Point, size: f64) -> Point {
     at.map(|x| if x.abs() < 1e-9 * size { 0.0 } else { x })
 }
 
-/// A number with ten digits.
+/// A number with seven digits; with a power of ten if it is large or small.
 fn digits(value: f64) -> String {
     if value == 0.0 {
         return "0.0".into();
     }
-    let rounded: f64 = format!("{value:.9e}").parse().unwrap_or(value);
-    format!("{rounded:?}")
+    let rounded: f64 = format!("{value:.6e}").parse().unwrap_or(value);
+    if (1e-4..1e7).contains(&rounded.abs()) { format!("{rounded:?}") } else { format!("{rounded:e}") }
 }
+
+/// The name of the picture of a section: that of the section, with a number if pictures of sections
+/// above it in the deck would be overwritten, also where a file system ignores case.
+fn picture_name(section: &str, deck: &Deck) -> String {
+    let mut taken = HashSet::new();
+    for own in &deck.sections {
+        let plain = file_name(&own.name.value);
+        let numbered = (2_usize..).map(|number| format!("{plain}_{number}"));
+        let files = |name: &String| [name.to_lowercase(), format!("{name}{WARPING}").to_lowercase()];
+        let is_free = |name: &String| files(name).iter().all(|file| !taken.contains(file));
+        let found = std::iter::once(plain.clone()).chain(numbered).find(is_free).unwrap_or(plain.clone());
+        taken.extend(files(&found));
+        if own.name.value == section {
+            return found;
+        }
+    }
+    file_name(section)
+}
+
+/// End of the name of the picture of the warping
+const WARPING: &str = "-warping";
 
 /// The name of a file without signs that mean something in paths.
 fn file_name(name: &str) -> String {

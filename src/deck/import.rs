@@ -3,7 +3,7 @@
 
 use super::beam::StationsWord;
 use super::diagnostic::Severity;
-use super::{Diagnostic, Words};
+use super::{Diagnostic, Span, Words};
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -104,12 +104,12 @@ impl Importer<'_> {
     fn beams(&mut self, document: &mut DocumentMut) {
         let Some(beams) = document.get_mut("beam").and_then(Item::as_array_of_tables_mut) else { return };
         for (number, beam) in beams.iter_mut().enumerate() {
-            if let Some(path) = named(beam.get("through"))
+            if let Some(path) = self.named(beam.get("through"))
                 && let Some(points) = self.table(&path, |table| table.points())
             {
                 beam.insert("through", Item::Value(points.into()));
             }
-            if let Some(path) = named(beam.get("section"))
+            if let Some(path) = self.named(beam.get("section"))
                 && let Some(Stations { unit, places: stations, sections }) = self.table(&path, |table| table.sections())
             {
                 let name = beam.get("name").and_then(Item::as_str).map_or(number.to_string(), str::to_string);
@@ -140,7 +140,7 @@ impl Importer<'_> {
 
     fn outlines_of(&mut self, table: &mut dyn TableLike) {
         for key in ["outline", "profile"] {
-            if let Some(path) = named(table.get(key))
+            if let Some(path) = self.named(table.get(key))
                 && let Some(points) = self.table(&path, Csv::points_of_plane)
             {
                 table.insert(key, Item::Value(points.into()));
@@ -148,8 +148,7 @@ impl Importer<'_> {
         }
         let holes = table.get_mut("holes").and_then(Item::as_array_mut);
         for hole in holes.into_iter().flat_map(Array::iter_mut) {
-            let path = hole.as_inline_table().and_then(|table| table.get("csv")?.as_str());
-            if let Some(path) = path.map(str::to_string)
+            if let Some(path) = self.file_of(hole.as_inline_table().map(|table| table as &dyn TableLike))
                 && let Some(points) = self.table(&path, Csv::points_of_plane)
             {
                 *hole = points.into();
@@ -161,7 +160,7 @@ impl Importer<'_> {
     fn surfaces(&mut self, document: &mut DocumentMut) {
         let Some(surfaces) = document.get_mut("surface").and_then(Item::as_array_of_tables_mut) else { return };
         for surface in surfaces.iter_mut() {
-            let Some(path) = named(surface.get("through")) else { continue };
+            let Some(path) = self.named(surface.get("through")) else { continue };
             let Some((points, radii)) = self.table(&path, |table| Ok((table.points()?, table.radii()))) else {
                 continue;
             };
@@ -188,6 +187,27 @@ impl Importer<'_> {
         }
     }
 
+    /// The file of `{ csv = "…" }`.
+    fn named(&mut self, item: Option<&Item>) -> Option<String> {
+        self.file_of(item?.as_table_like())
+    }
+
+    /// The file that a table names; other keys beside it are errors.
+    fn file_of(&mut self, table: Option<&dyn TableLike>) -> Option<String> {
+        let table = table?;
+        let path = table.get("csv")?.as_str()?.to_string();
+        let Some((key, _)) = table.iter().find(|(key, _)| *key != "csv") else { return Some(path) };
+        let message = format!("`{key}` is not known beside `csv`: write {{ csv = \"{path}\" }}");
+        self.found.push(Diagnostic::error(message, self.place(&path)));
+        None
+    }
+
+    /// The place of the name of a file in the text.
+    fn place(&self, path: &str) -> Span {
+        let start = self.text.find(&format!("\"{path}\"")).map_or(0, |at| at + 1);
+        start..start + path.len()
+    }
+
     /// Reads a file; errors are reported at its name.
     fn table<T>(&mut self, path: &str, of: impl Fn(&Csv) -> Result<T, String>) -> Option<T> {
         let wrong = |message: String| Unreadable { message, severity: Severity::Error };
@@ -206,18 +226,14 @@ impl Importer<'_> {
                 Some(found)
             }
             Err(Unreadable { message, severity }) => {
-                let start = self.text.find(&format!("\"{path}\"")).map_or(0, |at| at + 1);
-                let error = Diagnostic::error(format!("{path}: {message}"), start..start + path.len());
+                let names_file = message.split(": ").next().is_some_and(|first| first.ends_with(path));
+                let message = if names_file { message } else { format!("{path}: {message}") };
+                let error = Diagnostic::error(message, self.place(path));
                 self.found.push(Diagnostic { severity, ..error });
                 None
             }
         }
     }
-}
-
-/// The file of `{ csv = "…" }`.
-fn named(item: Option<&Item>) -> Option<String> {
-    Some(item?.as_table_like()?.get("csv")?.as_str()?.to_string())
 }
 
 /// Stations along a beam, and the section at each.
@@ -531,6 +547,10 @@ mod tests {
         }
         let gone = || Unreadable { message: "there is no such file".into(), severity: Severity::File };
         let missing = import(through, &|_| Err(gone())).unwrap_err();
+        let beside = |_: &str| Err(Unreadable { message: "decks/a.csv: gone".into(), severity: Severity::File });
+        assert_eq!(import(through, &beside).unwrap_err()[0].message, "decks/a.csv: gone");
+        let more = "[[beam]]\nthrough = { csv = \"a.csv\", foo = 2 }\n";
+        assert!(import(more, &beside).unwrap_err()[0].message.starts_with("`foo` is not known"));
         assert!(missing[0].message.contains("no such file") && missing[0].severity == Severity::File);
     }
 

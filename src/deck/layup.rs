@@ -2,6 +2,7 @@
 
 use super::diagnostic::{Span, Spanned};
 use super::reader::{Context, Item, Table};
+use super::section_shape::read_angle;
 use toml::de::DeValue;
 
 /// `[layup.NAME]`
@@ -53,6 +54,6 @@ fn read_ply(context: &Context, item: &Item) -> Option<Ply> {
         return context
             .wrong(thickness.span, format!("a ply must have a positive thickness, found {}", thickness.value));
     }
-    let theta = angle.map_or(Some(0.0), |angle| context.number(angle).map(|angle| angle.value))?;
+    let theta = angle.map_or(Some(0.0), |angle| read_angle(context, angle))?;
     Some(Ply { material: material?, thickness: thickness.value, theta, span })
 }

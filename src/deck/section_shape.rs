@@ -3,6 +3,7 @@
 use super::diagnostic::{Diagnostic, Span, Spanned};
 use super::reader::{Context, Item, Table, joined, kind_of};
 use super::words::{Words, words};
+use std::f64::consts::TAU;
 use toml::de::DeValue;
 
 words! {
@@ -406,6 +407,9 @@ pub struct Web {
     pub span: Span,
 }
 
+/// Relative round-off of a full turn that was computed
+const ROUND_OFF: f64 = 1e-9;
+
 /// Most points of an outline, walls or regions of a section.
 const MOST_PARTS: usize = 2000;
 
@@ -491,14 +495,14 @@ pub(super) fn read_shaped(table: &Table, layups: &[String]) -> Option<ComputedSe
     }
     let material = table.optional("material", |context, item| context.text(item));
     let reference = table.optional("reference", read_reference);
-    let turn = table.optional("turn", |context, item| context.number(item));
+    let turn = table.optional("turn", read_angle);
     let mesh = table.optional("mesh", read_mesh);
     let shear_factor = table.optional("shear_factor", |_, item| read_shear_factor(table, item));
     let fibre = read_fibre(table);
     let shape = read_shape(table, kind.value, layups);
     let (material, reference, turn, mesh, shear_factor) = (material?, reference?, turn?, mesh?, shear_factor?);
     let shape = shape?;
-    let turn = turn.map_or(0.0, |turn| turn.value);
+    let turn = turn.unwrap_or(0.0);
     let fibre = fibre?;
     let span = match kind.value {
         ShapeWord::Polygon => table.key_span("outline"),
@@ -524,10 +528,21 @@ fn read_shear_factor(table: &Table, item: &Item) -> Option<ShearFactor> {
 }
 
 fn read_fibre(table: &Table) -> Option<Fibre> {
-    let angle = |key: &str| table.optional(key, |context, item| context.number(item));
-    let theta = angle("theta");
-    let beta = angle("beta");
-    Some(Fibre { theta: theta?.map_or(0.0, |theta| theta.value), beta: beta?.map_or(0.0, |beta| beta.value) })
+    let theta = table.optional("theta", read_angle);
+    let beta = table.optional("beta", read_angle);
+    Some(Fibre { theta: theta?.unwrap_or(0.0), beta: beta?.unwrap_or(0.0) })
+}
+
+/// An angle in rad, of at most a full turn: more is usually meant in degrees.
+pub(super) fn read_angle(context: &Context, item: &Item) -> Option<f64> {
+    let angle = context.number(item)?;
+    if angle.value.abs() <= TAU * (1.0 + ROUND_OFF) {
+        return Some(angle.value);
+    }
+    let message = format!("an angle of {} rad is more than a full turn", angle.value);
+    let help = format!("angles are in rad: write \"{}*deg\"", angle.value);
+    context.report(Diagnostic::error(message, angle.span).help(help));
+    None
 }
 
 fn read_reference(context: &Context, item: &Item) -> Option<Reference> {
@@ -579,7 +594,13 @@ fn read_shape(table: &Table, kind: ShapeWord, layups: &[String]) -> Option<Compu
         }
         ShapeWord::Ellipse => {
             let (width, height) = pair("width", "height")?;
-            ComputedShape::Ellipse { size: [width, height], thickness: optional("thickness")? }
+            let thickness = optional("thickness")?;
+            if thickness.is_some_and(|thickness| 2.0 * thickness >= width.min(height)) {
+                let message = "`thickness` must be less than half of `width` and of `height`: leave it out for a \
+                               solid ellipse";
+                return table.wrong_key("thickness", message);
+            }
+            ComputedShape::Ellipse { size: [width, height], thickness }
         }
         ShapeWord::I => {
             let body = flanged()?;
@@ -795,7 +816,8 @@ fn read_wall<'a>(
     let plies = match (table.get("thickness"), table.get("layup")) {
         (Some(_), None) => table.positive("thickness").map(|thickness| WallPlies::Thickness(thickness.value)),
         (None, Some(_)) => table.text("layup").map(WallPlies::Layup),
-        (Some(_), Some(_)) | (None, None) => table.wrong("a wall needs `thickness` or `layup`"),
+        (Some(_), Some(_)) => table.wrong_key("layup", "a wall has `thickness` or `layup`, not both"),
+        (None, None) => table.wrong("a wall needs `thickness` or `layup`"),
     };
     let side = table.word_or("side", side)?;
     let arc = table.optional("arc", |context, item| read_between(context, item, points));

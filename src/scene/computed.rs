@@ -15,7 +15,7 @@ use beamsim_core::section::grid::Rect;
 use beamsim_core::section::material::{self, Material};
 use beamsim_core::section::mesh::{Region, Tangent};
 use beamsim_core::section::outline::Outline;
-use beamsim_core::section::properties::{mass_centre, moved, turned};
+use beamsim_core::section::properties::{mass_centre, moved, moved_compliance, turned};
 use beamsim_core::section::triangulate::PlanarRegion;
 use beamsim_core::section::walls::{Bend, Ply, Walls};
 use beamsim_core::section::{Matrix6, Point, SectionError};
@@ -27,18 +27,25 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Couplings below this part of the root of the product of both diagonals are round-off
 const NO_COUPLING: f64 = 1e-9;
 
+/// Outlines and walls further from their origin than this many times their size are solved about
+/// their middle: the distance would cost digits
+const FAR: f64 = 100.0;
+
 /// Solutions that are kept, at most: a sweep over dimensions of a section must not fill the memory
 const MOST_KEPT: usize = 64;
 
 /// A section of the deck as computed.
 #[derive(Clone)]
 pub struct SolvedSection {
-    /// Mesh and solution in the coordinates of the shape; none for closed forms
+    /// Mesh and solution; none for closed forms
     pub solution: Option<Solution>,
     /// The point of the shape through which the line of the beam goes
     pub place: Point,
     /// Stiffness and mass about the line of the beam
     pub matrices: SectionMatrices,
+    /// Compliance about the line of the beam, for shapes far from their origin: the inverse of their
+    /// stiffness may have lost its digits
+    pub compliance: Option<Matrix6>,
 }
 
 /// A solution by finite elements and the materials of its regions.
@@ -48,6 +55,8 @@ pub struct Solution {
     pub analysis: Arc<Analysis>,
     /// Materials
     pub materials: Vec<Material>,
+    /// Origin of mesh and solution in the coordinates of the shape
+    pub origin: Point,
 }
 
 /// A shape, ready to be solved.
@@ -74,6 +83,8 @@ pub fn solved(section: &deck::Section, deck: &Deck) -> Option<Result<SolvedSecti
 
 /// Computes a section.
 fn solve(section: &deck::Section, body: &ComputedSection, deck: &Deck) -> Result<SolvedSection, Diagnostic> {
+    let near = far_middle(&body.shape).map(|origin| (origin, near_origin(body, origin)));
+    let (origin, body) = near.as_ref().map_or(([0.0; 2], body), |(origin, near)| (*origin, near));
     let mut draft = Draft { deck, section, body, materials: Vec::new(), regions: Vec::new() };
     if let Some(closed) = draft.closed_form()? {
         return Ok(draft.placed(None, closed));
@@ -92,11 +103,18 @@ fn solve(section: &deck::Section, body: &ComputedSection, deck: &Deck) -> Result
         Some(deck::MeshAim::Error(error)) => MeshAim::Error(error),
         Some(deck::MeshAim::Size(size)) => MeshAim::Size(size),
     };
-    let analysis = kept(&geometry, &draft.materials, aim).map_err(|error| draft.explain(&error))?;
+    let analysis = kept(&geometry, &draft.materials, aim).map_err(|error| draft.explain(&error.moved(origin)))?;
     let closed = Closed { stiffness: analysis.solution.stiffness, mass: analysis.solution.mass };
     let place = draft.place(&analysis);
-    let solution = Solution { analysis, materials: draft.materials.clone() };
-    Ok(draft.placed(Some((solution, place)), closed))
+    let compliance = moved_compliance(&analysis.solution.compliance, place);
+    let solution = Solution { analysis, materials: draft.materials.clone(), origin };
+    let mut found = draft.placed(Some((solution, place)), closed);
+    if near.is_some() {
+        found.place = [place[0] + origin[0], place[1] + origin[1]];
+        found.compliance = Some(turned(&compliance, -body.turn));
+    }
+    section::within_range(found.matrices.clone(), section)?;
+    Ok(found)
 }
 
 /// A warning about a section whose error is large, or larger than it was to be.
@@ -200,7 +218,7 @@ impl Draft<'_> {
             stiffness: std::array::from_fn(|i| std::array::from_fn(|j| stiffness[(i, j)])),
             mass: has_density(self.body, self.deck).then(|| mass_per_length(&mass)),
         };
-        SolvedSection { solution: solution.map(|(solution, _)| solution), place, matrices }
+        SolvedSection { solution: solution.map(|(solution, _)| solution), place, matrices, compliance: None }
     }
 
     /// The index of a material among those of the section.
@@ -447,6 +465,72 @@ impl Draft<'_> {
             | SectionError::Singular
             | SectionError::Interrupted => Diagnostic::error(message, span),
         }
+    }
+}
+
+/// The middle of the box around outlines or walls that lie far from their origin.
+fn far_middle(shape: &ComputedShape) -> Option<Point> {
+    let mut low = [f64::INFINITY; 2];
+    let mut high = [f64::NEG_INFINITY; 2];
+    let mut include = |at: &mut Point, radius: f64| {
+        for axis in 0..2 {
+            low[axis] = low[axis].min(at[axis] - radius);
+            high[axis] = high[axis].max(at[axis] + radius);
+        }
+    };
+    visit_points(&mut shape.clone(), &mut include);
+    let middle = [0, 1].map(|axis| 0.5 * (low[axis] + high[axis]));
+    let size = (high[0] - low[0]).max(high[1] - low[1]);
+    let is_far = middle.iter().any(|x| x.is_finite() && x.abs() > FAR * size);
+    (is_far && middle.iter().all(|x| x.is_finite())).then_some(middle)
+}
+
+/// A section whose shape is moved so that a point becomes its origin.
+fn near_origin(body: &ComputedSection, origin: Point) -> ComputedSection {
+    let from_origin = |at: Point| [at[0] - origin[0], at[1] - origin[1]];
+    let mut near = body.clone();
+    visit_points(&mut near.shape, &mut |at, _| *at = from_origin(*at));
+    near.reference = match body.reference {
+        Some(Reference::Point(at)) => Some(Reference::Point(from_origin(at))),
+        None if body.shape.has_own_origin() => Some(Reference::Point(from_origin([0.0; 2]))),
+        Some(Reference::Word(_)) | None => body.reference,
+    };
+    near
+}
+
+/// Calls a function with the points of outlines and walls, and with the radius of circles about
+/// them; airfoils and profiles are near their origin.
+fn visit_points(shape: &mut ComputedShape, visit: &mut dyn FnMut(&mut Point, f64)) {
+    match shape {
+        ComputedShape::Polygon { outline, holes } => {
+            visit_outline(outline, visit);
+            holes.iter_mut().for_each(|hole| visit_outline(hole, visit));
+        }
+        ComputedShape::Regions(regions) => {
+            for region in regions {
+                visit_outline(&mut region.outline, visit);
+                region.holes.iter_mut().for_each(|hole| visit_outline(hole, visit));
+            }
+        }
+        ComputedShape::Walls(walls) => {
+            walls.points.iter_mut().for_each(|(_, at)| visit(at, 0.0));
+            walls.walls.iter_mut().filter_map(|wall| wall.arc.as_mut()).for_each(|at| visit(at, 0.0));
+        }
+        ComputedShape::Solid(_)
+        | ComputedShape::Ellipse { .. }
+        | ComputedShape::I { .. }
+        | ComputedShape::Channel(_)
+        | ComputedShape::T(_)
+        | ComputedShape::Angle { .. }
+        | ComputedShape::Box { .. }
+        | ComputedShape::Airfoil(_) => {}
+    }
+}
+
+fn visit_outline(outline: &mut deck::Outline, visit: &mut dyn FnMut(&mut Point, f64)) {
+    match outline {
+        deck::Outline::Corners(corners) => corners.iter_mut().for_each(|(at, _)| visit(at, 0.0)),
+        deck::Outline::Circle { centre, radius } => visit(centre, *radius),
     }
 }
 

@@ -19,7 +19,7 @@ mod surfaces;
 mod switches;
 
 pub use compose::Reason;
-pub use computed::{Solution, SolvedSection, solved};
+pub use computed::{Solution, SolvedSection, solved, warning as section_warning};
 pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
 pub use section::matrices as section_matrices;

@@ -192,7 +192,8 @@ fn of_shape(section: &deck::Section, deck: &Deck) -> Result<SectionMatrices, Dia
 
 /// Refuses resultants of a shape that no floating-point number holds.
 pub fn within_range(found: SectionMatrices, section: &deck::Section) -> Result<SectionMatrices, Diagnostic> {
-    let stiff = (0..6).all(|k| found.stiffness[k][k].is_finite() && found.stiffness[k][k] > 0.0);
+    let is_finite = found.stiffness.iter().flatten().all(|entry| entry.is_finite());
+    let stiff = is_finite && (0..6).all(|k| found.stiffness[k][k] > 0.0);
     let heavy = found.mass.as_ref().is_none_or(|mass| mass.mass.is_finite() && mass.about_line.max_abs().is_finite());
     if stiff && heavy {
         return Ok(found);

@@ -308,10 +308,42 @@ fn section_shows_numbers_and_draws() {
     let again = folder.beamsim(&["section", "pasted.toml", "box", "--json"]);
     let numbers: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
     let area = 2.0 - 0.8 * 1.8;
+    let computed = folder.beamsim(&["section", "deck.toml", "box", "--json"]);
+    let computed: serde_json::Value = serde_json::from_slice(&computed.stdout).unwrap();
+    assert_eq!(numbers["stiffness"], computed["stiffness"]);
     assert!((numbers["ea"].as_f64().unwrap() / (100.0 * area) - 1.0).abs() < 1e-6, "{numbers}");
     assert!((numbers["mass"][0][0].as_f64().unwrap() / (2.0 * area) - 1.0).abs() < 1e-6, "{numbers}");
     let output = folder.beamsim(&["section", "deck.toml", "bax"]);
     assert_eq!((status(&output), last_line(&output).contains("no section `bax`")), (2, true));
+}
+
+#[test]
+fn pictures_of_sections_do_not_overwrite_each_other() {
+    let folder = Folder::new("section_names");
+    let mut deck = "[material.m]\nE = 1\nnu = 0.3\n".to_string();
+    for name in ["a/b", "a_b", "A_B-warping"] {
+        deck += &format!("[section.\"{name}\"]\nshape = \"box\"\nmaterial = \"m\"\nd = 2\nb = 1\nt = 0.1\n");
+    }
+    folder.write("deck.toml", &deck);
+    assert_eq!(status(&folder.beamsim(&["section", "deck.toml"])), 0);
+    let names = ["A_B-warping_2-warping", "A_B-warping_2", "a_b-warping", "a_b", "a_b_2-warping", "a_b_2"];
+    assert_eq!(folder.names("results/deck"), names.map(|name| format!("{name}.svg")));
+    // One section alone has the same picture.
+    assert_eq!(status(&folder.beamsim(&["section", "deck.toml", "a_b", "--out", "alone"])), 0);
+    assert_eq!(folder.names("alone"), ["a_b_2-warping.svg", "a_b_2.svg"]);
+}
+
+#[test]
+fn section_warns_of_coarse_meshes() {
+    let folder = Folder::new("coarse_section");
+    let flat = "[material.m]\nE = 1\nnu = 0.3\n[section.flat]\nshape = \"ellipse\"\nmaterial = \"m\"\n\
+                width = 100\nheight = 1\nmesh = { size = 1000 }\n";
+    folder.write("deck.toml", flat);
+    let output = folder.beamsim(&["section", "deck.toml"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!((status(&output), errors.contains("warning[coarse_section]")), (0, true), "{errors}");
+    let output = folder.beamsim(&["section", "deck.toml", "--deny-warnings"]);
+    assert!(status(&output) != 0 && last_line(&output).contains("1 warning(s)"), "{}", last_line(&output));
 }
 
 /// The first step on offer fails in two steps of five, and takes three times the iterations of half of it.

@@ -4,7 +4,7 @@ use beamsim::deck::{self, Deck};
 use beamsim::scene;
 use beamsim_core::model::SectionMatrices;
 use beamsim_core::section::Matrix6;
-use beamsim_core::section::properties::{moved, relative_difference, turned};
+use beamsim_core::section::properties::{Properties, moved, relative_difference, turned};
 use serde_json::Value;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -220,4 +220,32 @@ fn an_airfoil_is_its_skin() {
         assert!((plus[(i, i)] / ellipse[(i, i)] - 1.0).abs() < 0.1, "{i}: {} {}", plus[(i, i)], ellipse[(i, i)]);
         assert!((plus[(i, i)] / minus[(i, i)] - 1.0).abs() < 1e-3);
     }
+}
+
+/// Coordinates of maps: the origin is far away.
+#[test]
+fn sections_far_from_their_origin_keep_their_digits() {
+    let properties = |left: f64, reference: &str| {
+        let (right, low, high) = (left + 20.0, left, left + 10.0);
+        let outline = format!("[[{left}, {low}], [{right}, {low}], [{right}, {high}], [{left}, {high}]]");
+        let text = format!(
+            "[material.m]\nE = 1\nnu = 0.3\n[section.s]\nshape = \"polygon\"\nmaterial = \"m\"\n\
+             outline = {outline}\n{reference}"
+        );
+        let deck = read(&text);
+        let solved = scene::solved(&deck.sections[0], &deck).unwrap().unwrap_or_else(|found| panic!("{found:?}"));
+        let stiffness = Matrix6::from_fn(|i, j| solved.matrices.stiffness[i][j]);
+        let compliance = solved.compliance.unwrap_or_else(|| stiffness.try_inverse().unwrap());
+        (solved.place, Properties::new(&compliance))
+    };
+    let (_, near) = properties(0.0, "");
+    let (place, far) = properties(1e6, "");
+    assert_eq!(place, [0.0; 2]);
+    assert!((far.gj / near.gj - 1.0).abs() < 1e-3, "{far:?}");
+    for (found, exact) in [(far.shear_centre, [1e6 + 10.0, 1e6 + 5.0]), (far.tension_centre, [1e6 + 10.0, 1e6 + 5.0])] {
+        assert!((0..2).all(|axis| (found[axis] - exact[axis]).abs() < 1e-2), "{far:?}");
+    }
+    let (place, centred) = properties(1e6, "reference = \"centroid\"");
+    assert!((0..2).all(|axis| (place[axis] - [1e6 + 10.0, 1e6 + 5.0][axis]).abs() < 1e-5), "{place:?}");
+    assert!((centred.ea / 200.0 - 1.0).abs() < 1e-9 && (centred.ga[0] / near.ga[0] - 1.0).abs() < 1e-3, "{centred:?}");
 }

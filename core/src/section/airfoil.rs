@@ -107,6 +107,7 @@ impl Airfoil {
         let [start, stop] = [around[0].1, around[around.len() - 1].1];
         let closing = self.closing_plies(&parts, end)?;
         self.add(&mut walls, [stop, start], 0.0, &closing);
+        self.check_webs()?;
         for web in &self.webs {
             if web.at >= end {
                 let message =
@@ -119,6 +120,20 @@ impl Airfoil {
             self.add(&mut walls, ends, 0.5 * thickness(&web.plies), &web.plies);
         }
         Ok(walls)
+    }
+
+    /// Refuses webs that overlap.
+    fn check_webs(&self) -> Result<(), SectionError> {
+        for (k, first) in self.webs.iter().enumerate() {
+            for second in &self.webs[k + 1..] {
+                let apart = (second.at - first.at).abs() * self.chord;
+                if apart < 0.5 * (1.0 - SAME_PLACE) * (thickness(&first.plies) + thickness(&second.plies)) {
+                    let message = format!("the webs at {} and {} overlap", first.at, second.at);
+                    return Err(SectionError::Dimensions { message });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Adds a wall between two points in parts of the chord.

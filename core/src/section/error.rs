@@ -144,7 +144,7 @@ impl fmt::Display for SectionError {
             Self::InvertedElement { region, at } => write!(
                 out,
                 "the mesh of region `{region}` has a folded element near {}: a curved edge comes too close to \
-                 another edge. Use a finer mesh",
+                 another edge. Usually a wall or skin is thicker than its radius or than half of the room for it",
                 show(*at)
             ),
             Self::Singular => {
@@ -156,6 +156,37 @@ impl fmt::Display for SectionError {
 }
 
 impl std::error::Error for SectionError {}
+
+impl SectionError {
+    /// The error of a section that was moved: its points are shown where they were, from `origin`.
+    pub fn moved(self, origin: Point) -> Self {
+        if origin == [0.0; 2] {
+            return self;
+        }
+        let back = |at: Point| [at[0] + origin[0], at[1] + origin[1]];
+        match self {
+            Self::CrossingEdges { first, second } => {
+                Self::CrossingEdges { first: first.map(back), second: second.map(back) }
+            }
+            Self::NotConnected { first, second, near } => Self::NotConnected { first, second, near: back(near) },
+            Self::InvertedElement { region, at } => Self::InvertedElement { region, at: back(at) },
+            Self::Dimensions { message } => {
+                Self::Dimensions { message: format!("{message} (points are given from {})", show(origin)) }
+            }
+            Self::NotPositiveDefinite { .. }
+            | Self::PoissonRatio { .. }
+            | Self::NotPositive { .. }
+            | Self::Outline { .. }
+            | Self::EmptyRegion { .. }
+            | Self::OverlappingRegions { .. }
+            | Self::TooThin { .. }
+            | Self::TooLarge { .. }
+            | Self::Meshing { .. }
+            | Self::Singular
+            | Self::Interrupted => self,
+        }
+    }
+}
 
 /// Most nodes of a mesh
 const MAX_NODES: usize = 100_000;

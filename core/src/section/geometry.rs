@@ -176,11 +176,13 @@ impl Shape {
     fn mesh(&self, fineness: Fineness) -> Result<Mesh, SectionError> {
         match self {
             Self::Ellipse { semi_axes, thickness, region } => {
+                let [shorter, longer] = [semi_axes[0].min(semi_axes[1]), semi_axes[0].max(semi_axes[1])];
+                check_slenderness(longer / shorter)?;
                 let hole = thickness.map(|thickness| semi_axes.map(|a| a - thickness));
                 if let Some(thickness) = thickness {
                     check_positive(&[("the thickness", *thickness)])?;
-                    check_positive(&[("the radius of the hole", semi_axes[0].min(semi_axes[1]) - thickness)])?;
-                    check_slenderness(semi_axes[0].max(semi_axes[1]) / thickness)?;
+                    check_positive(&[("the radius of the hole", shorter - thickness)])?;
+                    check_slenderness(longer / thickness)?;
                 }
                 mesh_ellipse(*semi_axes, hole, region, fineness)
             }

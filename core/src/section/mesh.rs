@@ -5,6 +5,9 @@ use super::element::{ElementKind, MAX_NODES, SectionPoint};
 use super::error::SectionError;
 use std::collections::HashMap;
 
+/// Boundaries nearer than this part of the size of the section are on one line
+const SAME_LINE: f64 = 1e-9;
+
 /// A connected part of a section with one material and one orientation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
@@ -153,24 +156,54 @@ impl Mesh {
         self.check_connected()
     }
 
-    /// Checks that the boundary does not cross itself: walls that cross without a common point
-    /// would otherwise cover the same place twice.
+    /// Checks that the boundary does not cross itself and does not run twice along a line with the
+    /// material on one side: walls that cross without a common point, or lie on one line, would
+    /// otherwise cover the same place twice.
     pub fn check_overlap(&self) -> Result<(), SectionError> {
+        self.check_common_sides()?;
+        let slack = SAME_LINE * self.size();
         let mut pieces = self.boundary();
         let low = |piece: &BoundaryPiece, axis: usize| piece.ends[0][axis].min(piece.ends[1][axis]);
         let high = |piece: &BoundaryPiece, axis: usize| piece.ends[0][axis].max(piece.ends[1][axis]);
         pieces.sort_by(|a, b| low(a, 0).total_cmp(&low(b, 0)));
         for (k, first) in pieces.iter().enumerate() {
             // Pieces that begin further right than this one ends cannot cross it.
-            for second in pieces[k + 1..].iter().take_while(|second| low(second, 0) <= high(first, 0)) {
-                let apart = low(second, 1) > high(first, 1) || high(second, 1) < low(first, 1);
-                if !apart && lines_cross(first.ends, second.ends, 0.0) {
+            for second in pieces[k + 1..].iter().take_while(|second| low(second, 0) <= high(first, 0) + slack) {
+                let apart = low(second, 1) > high(first, 1) + slack || high(second, 1) < low(first, 1) - slack;
+                let overlaps =
+                    || lines_cross(first.ends, second.ends, 0.0) || lines_cover(first.ends, second.ends, slack);
+                if !apart && overlaps() {
                     let name = |piece: &BoundaryPiece| self.regions[piece.region as usize].name.clone();
                     return Err(SectionError::OverlappingRegions { first: name(first), second: name(second) });
                 }
             }
         }
         Ok(())
+    }
+
+    /// Refuses two elements on the same side of a common side. Sides go around elements
+    /// counterclockwise, so that neighbours have opposite directions.
+    fn check_common_sides(&self) -> Result<(), SectionError> {
+        let mut owners: HashMap<[u32; 2], u32> = HashMap::new();
+        for element in &self.elements {
+            for side in 0..element.kind.corners() {
+                let [a, b, _] = element.kind.side(side).map(|local| element.nodes[local]);
+                if let Some(other) = owners.insert([a, b], element.region) {
+                    let [first, second] = [other, element.region].map(|r| self.regions[r as usize].name.clone());
+                    return Err(SectionError::OverlappingRegions { first, second });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The longer side of the box around the section.
+    fn size(&self) -> f64 {
+        let extent = |axis: usize| {
+            let values = self.nodes.iter().map(|node| node[axis]);
+            values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
+        };
+        extent(0).max(extent(1))
     }
 
     /// Halves of the sides that belong to one element only.
@@ -260,6 +293,21 @@ pub fn lines_cross(first: [Point; 2], second: [Point; 2], tolerance: f64) -> boo
     ends(first, second) < 0.0 && ends(second, first) < 0.0
 }
 
+/// True if two lines of one direction cover a common stretch; nearer than the tolerance is common.
+fn lines_cover(first: [Point; 2], second: [Point; 2], tolerance: f64) -> bool {
+    let [a, b] = first;
+    let length = libm::hypot(b[0] - a[0], b[1] - a[1]);
+    let along = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+    let place = |p: Point| {
+        let to = [p[0] - a[0], p[1] - a[1]];
+        [along[0] * to[0] + along[1] * to[1], along[0] * to[1] - along[1] * to[0]]
+    };
+    let [[from, above], [to, beside]] = second.map(place);
+    let is_on_line = above.abs() <= tolerance && beside.abs() <= tolerance;
+    let covered = to.min(length) - from.max(0.0);
+    is_on_line && covered > tolerance.max(1e-6 * length)
+}
+
 /// Disjoint sets.
 struct UnionFind {
     parent: Vec<usize>,
@@ -283,5 +331,19 @@ impl UnionFind {
         let root = self.root(a);
         let other = self.root(b);
         self.parent[root.max(other)] = root.min(other);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_one_direction_cover_each_other() {
+        let line = |from: f64, to: f64, height: f64| [[from, height], [to, height]];
+        let covers = |second: [Point; 2]| lines_cover(line(0.0, 2.0, 0.0), second, 1e-9);
+        assert!(covers(line(1.0, 3.0, 0.0)) && covers(line(0.5, 1.5, 0.0)) && covers(line(-1.0, 3.0, 0.0)));
+        // Faces that touch have opposite directions; neighbours on a face have a common point.
+        assert!(!covers(line(3.0, 1.0, 0.0)) && !covers(line(2.0, 3.0, 0.0)) && !covers(line(0.0, 2.0, 1e-3)));
     }
 }

@@ -5,7 +5,7 @@
 
 use super::Point;
 use super::element::{ElementKind, MAX_NODES};
-use super::error::SectionError;
+use super::error::{SectionError, check_slenderness};
 use super::grid::Fineness;
 use super::mesh::{Element, Mesh, ReentrantCorner, Region, lines_cross};
 use super::outline::{Outline, Side, arc_angles, distance};
@@ -108,6 +108,10 @@ pub fn mesh_regions(regions: &[PlanarRegion], fineness: Fineness) -> Result<Mesh
     let perimeter: f64 = boundaries.loops.iter().map(|(_, outline)| outline.perimeter()).sum();
     let thickness = 2.0 * area / perimeter;
     let sizes = Sizes { largest: thickness / (0.75 * fineness.least), per_wall: 2.0 * fineness.density, corners };
+    let walls = 2.0 * area / boundaries.free_perimeter();
+    if walls > 0.0 {
+        check_slenderness(boundaries.extent(0).max(boundaries.extent(1)) / walls)?;
+    }
     // Also refuses holes that are larger than what they are in.
     let triangles = boundaries.box_area() / (MAX_AREA * sizes.largest * sizes.largest);
     if area <= 0.0 || triangles > MAX_TRIANGLES || !triangles.is_finite() {
@@ -134,6 +138,7 @@ impl Boundaries {
             {
                 let area = outline.area();
                 if area.abs() <= 1e-12 * outline.size().powi(2) || !area.is_finite() {
+                    check_own_sides(outline)?;
                     let message = "has no area".to_string();
                     return Err(SectionError::Outline { region: planar.region.name.clone(), message });
                 }
@@ -237,12 +242,36 @@ impl Boundaries {
 
     /// Area of the box around all outlines.
     fn box_area(&self) -> f64 {
-        let points = || self.loops.iter().flat_map(|(_, outline)| &outline.points);
-        let extent = |axis: usize| {
-            let values = points().map(|point| point[axis]);
-            values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
-        };
-        extent(0) * extent(1)
+        self.extent(0) * self.extent(1)
+    }
+
+    /// Size of the box around all outlines along an axis.
+    fn extent(&self, axis: usize) -> f64 {
+        let values = self.loops.iter().flat_map(|(_, outline)| &outline.points).map(|point| point[axis]);
+        values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
+    }
+
+    /// Length of the sides that belong to one region only.
+    fn free_perimeter(&self) -> f64 {
+        /// Bits of both ends, and of the centre of an arc
+        type Key = ([[u64; 2]; 2], Option<[u64; 2]>);
+        let mut sides: HashMap<Key, (usize, f64)> = HashMap::new();
+        for (_, outline) in &self.loops {
+            for side in 0..outline.sides.len() {
+                let [from, to] = outline.ends(side).map(|at| at.map(f64::to_bits));
+                let centre = match outline.sides[side] {
+                    Side::Line => None,
+                    Side::Arc { centre, .. } => Some(centre.map(f64::to_bits)),
+                };
+                let known = sides.entry(([from.min(to), from.max(to)], centre)).or_insert((0, 0.0));
+                known.0 += 1;
+                known.1 += outline.length(side);
+            }
+        }
+        // The order of a hash map must not decide about the last digits.
+        let mut lengths: Vec<f64> = sides.into_values().filter(|(count, _)| *count == 1).map(|(_, l)| l).collect();
+        lengths.sort_by(f64::total_cmp);
+        lengths.iter().sum()
     }
 
     /// Re-entrant corners of the whole: points around which material fills more than half a turn,
@@ -335,6 +364,21 @@ impl Boundaries {
         }
         chords
     }
+}
+
+/// Refuses an outline whose straight sides cross each other, which may have no area.
+fn check_own_sides(outline: &Outline) -> Result<(), SectionError> {
+    let tolerance = SAME_POINT * outline.size();
+    let is_line = |side: &usize| outline.sides[*side] == Side::Line;
+    let lines: Vec<[Point; 2]> = (0..outline.sides.len()).filter(is_line).map(|side| outline.ends(side)).collect();
+    for (k, &first) in lines.iter().enumerate() {
+        for &second in &lines[k + 1..] {
+            if lines_cross(first, second, tolerance) {
+                return Err(SectionError::CrossingEdges { first, second });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Divided boundaries.
@@ -433,6 +477,11 @@ fn triangulate(regions: &[PlanarRegion], chords: &Chords, sizes: &Sizes) -> Resu
     Err(SectionError::Meshing { region, message })
 }
 
+/// The message where the mesh generator takes no coordinate of a point.
+fn out_of_range() -> String {
+    "its coordinates are too large or too small for the mesh generator: use another unit of length".to_string()
+}
+
 /// Triangulates and refines; `None` if refinement does not end.
 fn triangulate_with(
     regions: &[PlanarRegion],
@@ -445,7 +494,7 @@ fn triangulate_with(
     let mut triangulation = Delaunay::new();
     let mut handles = Vec::new();
     for at in &chords.vertices {
-        handles.push(triangulation.insert(Point2::new(at[0], at[1])).map_err(|error| failed(error.to_string()))?);
+        handles.push(triangulation.insert(Point2::new(at[0], at[1])).map_err(|_| failed(out_of_range()))?);
     }
     for (ends, chord) in chords.edges.iter().zip(&chords.list) {
         let [from, to] = ends.map(|end| handles[end]);
