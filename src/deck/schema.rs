@@ -299,7 +299,7 @@ mod tests {
             ("load.frame", words::<Frame>()),
             ("section.le", words::<deck::LeadingEdgeWord>()),
             ("section.shape", words::<deck::ShapeWord>()),
-            ("section.side", words::<deck::SideWord>()),
+            ("section.side", words::<deck::WallSideWord>()),
             ("section.skin.side", words::<deck::SkinSideWord>()),
             ("section.te", words::<deck::TrailingEdgeWord>()),
             ("section.theta_sense", words::<deck::ThetaSenseWord>()),
