@@ -135,6 +135,13 @@ pub(super) fn read_contact<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
         stages: stages?,
         span: table.span.clone(),
     };
+    for (key, names) in [("beams", &contact.beams), ("nodes", &contact.nodes), ("surfaces", &contact.surfaces)] {
+        let is_again = |k: usize| names[..k].iter().any(|other| other.value == names[k].value);
+        if let Some(twice) = (0..names.len()).find(|&k| is_again(k)).map(|k| &names[k]) {
+            let message = format!("`{key}` names `{}` twice: its contact would count double", twice.value);
+            return context.wrong(twice.span.clone(), message);
+        }
+    }
     if contact.beams.is_empty() && contact.nodes.is_empty() {
         return table.wrong("[[contact]] needs `beams` or `nodes`");
     }

@@ -227,3 +227,63 @@ fn a_ball_rebounds_with_its_restitution() {
         assert!((total - 2.0).abs() < 5e-3 * 2.0, "{extra}: {total}");
     }
 }
+
+/// A wire, or a ball if there are no elements, at the origin, inside or outside a surface about it.
+fn at_the_middle(carrier: &str, surface: &str) -> String {
+    format!(
+        r#"
+[point]
+a = [0, 0, 0]
+b = [1, 0, 0]
+{carrier}
+[[surface]]
+name = "round"
+{surface}
+[[contact]]
+name = "c"
+surfaces = ["round"]
+radius = 0.01
+"#
+    ) + if carrier.contains("[[beam]]") {
+        "beams = [\"wire\"]\n[[stage]]\nkind = \"static\"\nsteps = 2\n[output]\ncolumns = [\"u\", \"contact\"]\n"
+    } else {
+        "nodes = [\"a\"]\n[[stage]]\nkind = \"dynamic\"\nend = 1e-3\nstep = 1e-4\n[output]\ncolumns = [\"u\", \"contact\"]\n"
+    }
+}
+
+const WIRE: &str = "[section.s]\nEA = 1e3\nGA = 1e3\nGJ = 1\nEI = 1\n[[beam]]\nname = \"wire\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\n\
+                    elements = 4\n[[support]]\nat = \"a\"\nfix = \"all\"\n[[load]]\nat = \"b\"\nforce = [1e-3, 0, 0]\n";
+const BALL: &str = "[[body]]\nat = \"a\"\nmass = 1\n";
+
+#[test]
+fn gaps_are_known_where_surfaces_have_no_normal() {
+    let surfaces = [
+        (WIRE, "kind = \"cylinder\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nradius = 0.05\nside = \"inside\""),
+        (WIRE, "kind = \"tube\"\nthrough = [[-1, 0, 0], [0.5, 0, 0], [3, 0, 0]]\nradius = 0.05\nside = \"inside\""),
+        (BALL, "kind = \"sphere\"\nat = [0, 0, 0]\nradius = 0.05\nside = \"inside\""),
+        (BALL, "kind = \"torus\"\nat = [0, 1, 0]\naxis = [0, 0, 1]\nring = 1\nradius = 0.05\nside = \"inside\""),
+    ];
+    for (carrier, surface) in surfaces {
+        let gap = simulate(&at_the_middle(carrier, surface)).end("c.gap");
+        assert!((gap - 0.04).abs() < 1e-6, "{surface}: {gap}");
+    }
+}
+
+#[test]
+fn what_begins_at_a_centre_begins_inside() {
+    for surface in [
+        "kind = \"sphere\"\nat = [0, 0, 0]\nradius = 1",
+        "kind = \"cylinder\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nradius = 1",
+        "kind = \"sphere\"\nat = [0, 0, 0]\nradius = 0.005\nside = \"inside\"",
+    ] {
+        let failure = attempt(&at_the_middle(BALL, surface)).result.unwrap_err();
+        assert_eq!(failure.kind(), FailureKind::ContactStart, "{surface}: {failure}");
+    }
+}
+
+#[test]
+fn what_is_named_twice_is_refused() {
+    let text = at_the_middle(BALL, "kind = \"plane\"\npoint = [0, 0, -1]\nnormal = [0, 0, 1]");
+    let found = refusal(&text.replace("nodes = [\"a\"]", "nodes = [\"a\", \"a\"]"));
+    assert!(found.contains("`nodes` names `a` twice"), "{found}");
+}

@@ -677,7 +677,9 @@ fn contact(number: usize, at: &Snapshot, out: &mut Vec<f64>) {
         return;
     };
     let sum = contacts.resultant(number, at.state);
-    out.extend([sum.gap, (-sum.gap).max(0.0), sum.normal, sum.friction]);
+    // Where nothing is there to touch, such as beyond the open end of a tube.
+    let gap = if sum.gap.is_finite() { sum.gap } else { at.model.length };
+    out.extend([gap, (-gap).max(0.0), sum.normal, sum.friction]);
     out.extend(sum.force.0);
     out.extend(sum.moment.0);
     out.extend([sum.length, sum.points as f64, sum.sliding as f64]);

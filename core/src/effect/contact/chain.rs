@@ -7,7 +7,7 @@
 
 use crate::kernel::MAX_NODES;
 use crate::kernel::contact::along::weighted_sum;
-use crate::kernel::contact::{Carrier, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
+use crate::kernel::contact::{Carrier, Minima, Minimum, MinimumKind, Place, Shape, ShapeAt, Side, Surface, minima};
 use crate::system::{ChainMemory, Node, State};
 use crate::tensor::Vec3;
 
@@ -20,6 +20,10 @@ const REACH: [f64; MAX_NODES + 1] = [1.0, 1.0, 1.0, 1.25, 1.64];
 
 /// Gaps below this part of the radius are looked at.
 const MARGIN: f64 = 1e-5;
+
+/// Equal parts of an element at whose ends gaps from a box are looked at: its edges may lie between
+/// nodes.
+const PARTS_AT_BOXES: usize = 8;
 
 /// Beams without end caps touch with the rim of their end: the surface is nearest beside the end,
 /// not beyond it, if the cosine between its direction and the beam is below this.
@@ -140,14 +144,40 @@ impl Chain {
         (next as f64 - 1.0 + (fraction - from) / (to - from)) / self.order as f64
     }
 
-    /// The least gap of nodes and closest points; infinite where the surface has no normal.
+    /// The least gap of nodes and closest points, and at boxes of places between nodes; infinite
+    /// where nothing is there to touch.
     pub(super) fn least_gap(&self, surface: &Surface, carrier: &Carrier, at: &State) -> f64 {
         let places = self.seen(carrier, at);
-        let gap = |place: Vec3| surface.distance(place).map_or(f64::INFINITY, |d| d.value - self.radius);
-        let nodes = places.iter().map(|place| gap(*place)).fold(f64::INFINITY, f64::min);
+        let gap = |place: Vec3| surface.value(place, self.radius).map_or(f64::INFINITY, |value| value - self.radius);
+        let mut nodes = places.iter().map(|place| gap(*place)).fold(f64::INFINITY, f64::min);
+        if matches!(surface.shape, Shape::Box { .. }) && self.order == 1 {
+            let part = |k: usize| k as f64 / PARTS_AT_BOXES as f64;
+            let between = |ends: &[Vec3]| {
+                let inner = (1..PARTS_AT_BOXES).map(|k| gap(ends[0] + (ends[1] - ends[0]) * part(k)));
+                inner.fold(f64::INFINITY, f64::min)
+            };
+            nodes = places.windows(2).map(between).fold(nodes, f64::min);
+        }
         let seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0) };
         let elements = 0..if self.order == 0 { 0 } else { self.elements() };
         elements.flat_map(|k| seen.closest(k)).map(gap).fold(nodes, f64::min)
+    }
+
+    /// The first node at which the surface has no normal, and its penetration, if that is more than
+    /// `allowed`: such a node cannot find its way out.
+    pub(super) fn lost_node(
+        &self,
+        surface: &Surface,
+        carrier: &Carrier,
+        at: &State,
+        allowed: f64,
+    ) -> Option<(usize, f64)> {
+        let depth = |place: Vec3| {
+            let has_normal = surface.distance(place).is_ok();
+            let gap = surface.value(place, self.radius).filter(|_| !has_normal)? - self.radius;
+            (-gap > allowed).then_some(-gap)
+        };
+        self.seen(carrier, at).into_iter().enumerate().find_map(|(node, place)| Some((node, depth(place)?)))
     }
 
     /// Places of the nodes in the coordinates of a surface.

@@ -604,6 +604,21 @@ impl Contacts for SurfaceContacts {
                 }
             });
         });
+        for chain in &self.chains {
+            let laws = &self.laws[chain.contact];
+            if at.amplitude[laws.amplitude] == 0.0 {
+                continue;
+            }
+            let surface = &self.surfaces[chain.surface];
+            let carrier = surface.carrier(at, Weights::NONE);
+            let Some((node, depth)) = chain.lost_node(&surface.surface, &carrier, at, laws.penetration) else {
+                continue;
+            };
+            if deepest.as_ref().is_none_or(|deepest| depth > deepest.depth) {
+                let slot = chain.nodes[node].node.u;
+                deepest = Some(Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth });
+            }
+        }
         deepest
     }
 

@@ -111,6 +111,16 @@ impl Surface {
             Side::Inside => Ok(outside.reversed()),
         }
     }
+
+    /// The signed distance of a point, also where it has no normal: on an axis, at a centre. There
+    /// it is that of a point beside it, by a millionth of `size` at first, which is a length of the
+    /// order of gaps. `None` where nothing is there to touch.
+    pub fn value(&self, y: Vec3, size: f64) -> Option<f64> {
+        // Not along any axis that users choose.
+        const ASIDE: Vec3 = Vec3([0.613, 0.524, 0.592]);
+        let steps = [0.0, 1e-6, 1e-3, 1.0];
+        steps.into_iter().find_map(|step| self.distance(y + ASIDE * (step * size)).ok()).map(|distance| distance.value)
+    }
 }
 
 impl Shape {
