@@ -247,7 +247,7 @@ radius = 0.01
     ) + if carrier.contains("[[beam]]") {
         "beams = [\"wire\"]\n[[stage]]\nkind = \"static\"\nsteps = 2\n[output]\ncolumns = [\"u\", \"contact\"]\n"
     } else {
-        "nodes = [\"a\"]\n[[stage]]\nkind = \"dynamic\"\nend = 1e-3\nstep = 1e-4\n[output]\ncolumns = [\"u\", \"contact\"]\n"
+        "nodes = [\"a\"]\nstiffness = 1e4\n[[stage]]\nkind = \"dynamic\"\nend = 1e-3\nstep = 1e-4\n[output]\ncolumns = [\"u\", \"contact\"]\n"
     }
 }
 
