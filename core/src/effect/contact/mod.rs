@@ -99,6 +99,12 @@ struct PointNow<'a> {
 }
 
 impl SurfaceContacts {
+    /// Chains whose contact acts in a state, with its laws and the surface.
+    fn acting<'a>(&'a self, at: &'a State) -> impl Iterator<Item = (&'a Chain, &'a ContactLaws, &'a SceneSurface)> {
+        let with_parts = |chain: &'a Chain| (chain, &self.laws[chain.contact], &self.surfaces[chain.surface]);
+        self.chains.iter().map(with_parts).filter(|(_, laws, _)| at.amplitude[laws.amplitude] != 0.0)
+    }
+
     /// Visits the chains whose contact acts in a state.
     fn each_chain<'a>(&'a self, at: &'a State, weights: Weights, visit: &mut dyn FnMut(usize, &ChainNow<'a>)) {
         for (number, chain) in self.chains.iter().enumerate() {
@@ -604,12 +610,7 @@ impl Contacts for SurfaceContacts {
                 }
             });
         });
-        for chain in &self.chains {
-            let laws = &self.laws[chain.contact];
-            if at.amplitude[laws.amplitude] == 0.0 {
-                continue;
-            }
-            let surface = &self.surfaces[chain.surface];
+        for (chain, laws, surface) in self.acting(at) {
             let carrier = surface.carrier(at, Weights::NONE);
             let Some((node, depth)) = chain.lost_node(&surface.surface, &carrier, at, laws.penetration) else {
                 continue;
@@ -624,12 +625,7 @@ impl Contacts for SurfaceContacts {
 
     fn hidden_penetration(&self, at: &State) -> Option<Penetration> {
         let mut deepest: Option<Penetration> = None;
-        for chain in &self.chains {
-            let laws = &self.laws[chain.contact];
-            if at.amplitude[laws.amplitude] == 0.0 {
-                continue;
-            }
-            let surface = &self.surfaces[chain.surface];
+        for (chain, laws, surface) in self.acting(at) {
             let depth = -chain.least_gap(&surface.surface, &surface.carrier(at, Weights::NONE), at);
             let is_deepest = deepest.as_ref().is_none_or(|deepest| depth > deepest.depth);
             if depth > ROUNDED * laws.penetration && is_deepest {
@@ -641,11 +637,7 @@ impl Contacts for SurfaceContacts {
     }
 
     fn passed(&self, from: &State, to: &State) -> Option<Slot> {
-        for chain in &self.chains {
-            if to.amplitude[self.laws[chain.contact].amplitude] == 0.0 {
-                continue;
-            }
-            let surface = &self.surfaces[chain.surface];
+        for (chain, _, surface) in self.acting(to) {
             let depth = surface.depth();
             if depth == f64::INFINITY {
                 continue;
