@@ -129,19 +129,7 @@ pub fn damping_of(restitution: f64, speed: f64) -> Option<f64> {
     // The left side less the right side is positive below the root z and negative above it, up to
     // 1/e.
     let excess = |z: f64| z * (1.0 + restitution) - libm::log1p(z) + libm::log1p(-restitution * z);
-    let mut low = 0.0;
-    let mut high = 1.0 / restitution;
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            break;
-        }
-        if excess(middle) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let [low, _] = around_root(&excess, 1.0 / restitution);
     Some(low / speed)
 }
 
@@ -154,20 +142,26 @@ pub fn restitution(damping: f64, speed: f64) -> f64 {
     }
     // z (1+e) - ln(1+z) + ln(1-e z) falls with e, from a positive value at e = 0.
     let excess = |e: f64| z * (1.0 + e) - libm::log1p(z) + libm::log1p(-e * z);
+    let [low, high] = around_root(&excess, (1.0 / z).min(1.0));
+    0.5 * (low + high)
+}
+
+/// Neighbouring numbers from 0 to `high` between which a function changes from positive to negative.
+fn around_root(function: &impl Fn(f64) -> f64, high: f64) -> [f64; 2] {
     let mut low = 0.0;
-    let mut high = (1.0 / z).min(1.0);
+    let mut high = high;
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {
             break;
         }
-        if excess(middle) > 0.0 {
+        if function(middle) > 0.0 {
             low = middle;
         } else {
             high = middle;
         }
     }
-    0.5 * (low + high)
+    [low, high]
 }
 
 #[cfg(test)]
