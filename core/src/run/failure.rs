@@ -164,6 +164,13 @@ pub enum Failure {
     },
 }
 
+impl Moment {
+    /// The failure of something that exceeds a bound at this moment; `why` in words.
+    pub(super) fn limit(&self, why: &str) -> Failure {
+        Failure::Limit(format!("{why} ({self})"))
+    }
+}
+
 impl Place {
     /// The place of a slot, along `direction`.
     pub(super) fn of(model: &Model, slot: usize, direction: Vec3) -> Self {

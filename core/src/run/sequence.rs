@@ -54,7 +54,7 @@ impl<'o> Run<'o> {
         if matches!(result, Err(Failure::Io(_) | Failure::Interrupted { .. })) {
             return result;
         }
-        let at = Moment { stage: number + 1, time: self.run.state.time, load: self.run.state.load };
+        let at = self.moment_in(number);
         unless_interrupted(at).and(result)
     }
 
@@ -108,12 +108,18 @@ impl<'o> Run<'o> {
         Ok(run)
     }
 
+    /// The present moment, in stage `number` (from 0).
+    fn moment_in(&self, number: usize) -> Moment {
+        Moment { stage: number + 1, time: self.run.state.time, load: self.run.state.load }
+    }
+
     /// A stage on some degrees of freedom; `fresh`: loads act for the first time in it.
     fn stage_run(&mut self, number: usize, dof_map: DofMap, fresh: bool) -> Result<StageRun<'_>, Failure> {
         let stage = &self.plan.stages[number];
         let plane = dof_map.plane().copied();
         let assembly = Assembly::new(&stage.context(number), dof_map, &self.model);
-        let newton = newton_for(stage, &assembly, &self.model)?;
+        let at = self.moment_in(number);
+        let newton = newton_for(stage, &assembly, &self.model, at)?;
         let RunState { schedule, state, good, counters, issued, bookkeeper, past } = &mut self.run;
         if let Some(contacts) = self.model.contacts() {
             let advances = stage.work.kind().advances_time();
@@ -155,7 +161,7 @@ impl<'o> Run<'o> {
 
     /// Shows the observer a checkpoint before the start of a stage, if it wants one.
     fn offer_checkpoint(&mut self, number: usize) -> Result<(), Failure> {
-        let at = Moment { stage: number + 1, time: self.run.state.time, load: self.run.state.load };
+        let at = self.moment_in(number);
         unless_interrupted(at)?;
         if !self.observer.wants_checkpoint() {
             return Ok(());

@@ -21,7 +21,7 @@ impl InSpace {
         let (solver, system) = (&stage.newton.solver, &stage.assembly.system);
         match LinearSolver::beside(solver, system, &assembly.system, &stage.model.multipliers) {
             Some(solver) => Ok(Self { assembly, solver }),
-            None => Err(Failure::Limit("not enough memory for the out-of-plane stability check".into())),
+            None => Err(stage.moment().limit("not enough memory for the out-of-plane stability check")),
         }
     }
 }

@@ -95,9 +95,9 @@ pub(super) struct StageRun<'r> {
 }
 
 /// Newton's iteration on the system of a stage.
-pub(super) fn newton_for(stage: &Stage, assembly: &Assembly, model: &Model) -> Result<Newton, Failure> {
+pub(super) fn newton_for(stage: &Stage, assembly: &Assembly, model: &Model, at: Moment) -> Result<Newton, Failure> {
     let Some(solver) = LinearSolver::new(&assembly.system, &model.multipliers) else {
-        return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
+        return Err(at.limit("not enough memory for the factorisation of the tangent"));
     };
     let convergence = Convergence { tolerance: stage.tolerance };
     Ok(Newton::new(convergence, stage.max_iterations, solver, &assembly.system))

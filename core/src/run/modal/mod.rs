@@ -95,7 +95,11 @@ impl Modal<'_, '_> {
         let wanted = Wanted { modes: self.modes, enough: f64::INFINITY };
         let found = find_modes(&mut search, shift, wanted, tell, &mut counters.work)?;
         self.stage.unless_interrupted()?;
-        found.ok_or_else(|| Failure::Limit("the modes could not be found: a solve with the tangent failed".into()))
+        found.ok_or_else(|| {
+            let why = "the modes could not be found: a solve with the tangent failed. Look for stiffnesses or masses \
+                       near the limits of floating-point numbers";
+            self.stage.moment().limit(why)
+        })
     }
 
     /// Refuses motions that neither stiffness nor mass holds.

@@ -101,7 +101,7 @@ impl<'s, 'r> Descent<'s, 'r> {
         let mut acting = stage.model.acting(&context);
         acting.push(Arc::new(Resistance { slots, arm: ARM * stage.model.length }));
         let assembly = Assembly::of(acting, &context, dof_map, stage.model);
-        let newton = newton_for(stage.stage(), &assembly, stage.model)?;
+        let newton = newton_for(stage.stage(), &assembly, stage.model, stage.moment())?;
         Ok(Self { stage, assembly, newton, steps: MOST_STEPS })
     }
 
