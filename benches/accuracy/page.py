@@ -1,4 +1,5 @@
-"""Writes the tables of `docs/accuracy.md` from what is stored, each between its marks; the prose between them is by hand."""
+"""Writes the tables of `docs/accuracy.md` and `docs/accuracy/measurements.md` from what is stored, each between its marks;
+the prose between them is by hand."""
 
 import csv
 import re
@@ -10,15 +11,17 @@ import scenes
 WORTH_TELLING = 0.5
 
 
-def write(store, page):
+def write(store, pages):
     """Replaces what stands between `<!-- table: NAME -->` and `<!-- end -->`."""
-    text = page.read_text()
+    texts = {page: page.read_text() for page in pages}
     for name, table in tables(store).items():
         marked = re.compile(rf"(<!-- table: {re.escape(name)} -->\n).*?(<!-- end -->)", re.S)
-        if not marked.search(text):
-            raise SystemExit(f"{page} has no place for the table {name}")
-        text = marked.sub(lambda match: match[1] + "\n".join(table) + "\n" + match[2], text)
-    page.write_text(text)
+        page = next((page for page, text in texts.items() if marked.search(text)), None)
+        if page is None:
+            raise SystemExit(f"no page has a place for the table {name}")
+        texts[page] = marked.sub(lambda match: match[1] + "\n".join(table) + "\n" + match[2], texts[page])
+    for page, text in texts.items():
+        page.write_text(text)
 
 
 def tables(store):

@@ -166,7 +166,7 @@ def main():
                 if not given.scene:
                     store(f"{part}.csv", rows)
     if not given.scene:
-        page.write(STORE, variants.ROOT / "docs" / "accuracy.md")
+        page.write(STORE, [STORE.parent / "accuracy.md", STORE / "measurements.md"])
 
 
 main()
