@@ -234,6 +234,8 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
     let beams = listed(&top, "beam", beam::read_beam);
     let joints = listed(&top, "joint", joint::read_joint);
     let bodies = listed(&top, "body", body::read_body);
+    let surfaces = listed(&top, "surface", surface::read_surface);
+    let contacts = listed(&top, "contact", contact::read_contact);
     let histories = named(&top, "history", history::read_history);
     let read: Vec<&str> = [
         points.iter().map(|(name, _)| name.value.as_str()).collect::<Vec<_>>(),
@@ -241,6 +243,8 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         layups.iter().map(|l| l.name.value.as_str()).collect(),
         sections.iter().map(|s| s.name.value.as_str()).collect(),
         beams.iter().map(|b| b.name.value.as_str()).collect(),
+        surfaces.iter().map(|s| s.name.value.as_str()).collect(),
+        contacts.iter().map(|c| c.name.value.as_str()).collect(),
         histories.iter().map(|h| h.name.value.as_str()).collect(),
     ]
     .concat();
@@ -262,8 +266,8 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         joints,
         bodies,
         springs: listed(&top, "spring", spring::read_spring),
-        surfaces: listed(&top, "surface", surface::read_surface),
-        contacts: listed(&top, "contact", contact::read_contact),
+        surfaces,
+        contacts,
         loads: listed(&top, "load", load::read_load),
         damping: damping::read_damping(&top),
         initials: listed(&top, "initial", initial::read_initial),
@@ -292,9 +296,11 @@ fn defined_names(document: &DeTable) -> Vec<String> {
     let table = |key: &str| document.get(key).and_then(|item| item.get_ref().as_table());
     let named = ["point", "material", "layup", "section", "history"].into_iter().filter_map(table);
     let mut names: Vec<String> = named.flat_map(|t| t.keys().map(|k| k.get_ref().to_string())).collect();
-    if let Some(DeValue::Array(beams)) = document.get("beam").map(|item| item.get_ref()) {
-        let name = |beam: &reader::Item| Some(beam.get_ref().as_table()?.get("name")?.get_ref().as_str()?.to_string());
-        names.extend(beams.iter().filter_map(name));
+    let name = |entry: &reader::Item| Some(entry.get_ref().as_table()?.get("name")?.get_ref().as_str()?.to_string());
+    for key in ["beam", "surface", "contact"] {
+        if let Some(DeValue::Array(entries)) = document.get(key).map(|item| item.get_ref()) {
+            names.extend(entries.iter().filter_map(name));
+        }
     }
     names
 }

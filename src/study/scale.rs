@@ -56,6 +56,11 @@ fn scale_quantity(output: &str) -> Option<Quantity> {
     Some(if quantity == Quantity::GrowthRate { Quantity::AngularFrequency } else { quantity })
 }
 
+/// True if an output changes in jumps, so that its error says nothing about a mesh.
+pub(super) fn jumps(output: &str) -> bool {
+    quantity(output).is_some_and(Quantity::jumps)
+}
+
 /// Order at which the error of an output falls with the width of elements.
 pub(super) fn mesh_error(output: &str) -> MeshError {
     quantity(output).map_or(MeshError::Unspecified, Quantity::mesh_error)

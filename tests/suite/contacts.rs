@@ -1,7 +1,9 @@
 //! Contact with surfaces in whole scenes.
 
+use crate::random::Random;
 use crate::scenes::{attempt, refusal, simulate};
 use beamsim_core::failure::FailureKind;
+use beamsim_core::tensor::Vec3;
 
 /// A cantilever that a cylinder pushes down, in `steps` levels.
 fn under_cylinder(elements: usize, order: usize, steps: usize, extra: &str) -> String {
@@ -286,4 +288,187 @@ fn what_is_named_twice_is_refused() {
     let text = at_the_middle(BALL, "kind = \"plane\"\npoint = [0, 0, -1]\nnormal = [0, 0, 1]");
     let found = refusal(&text.replace("nodes = [\"a\"]", "nodes = [\"a\", \"a\"]"));
     assert!(found.contains("`nodes` names `a` twice"), "{found}");
+}
+
+/// A rod that falls on a box, both in random orientations.
+fn rod_on_box(random: &mut Random) -> String {
+    let order = random.range(1.0, 3.99) as usize;
+    let elements = random.range(1.0, 5.99) as usize;
+    let [first, second] = [random.direction(), random.direction()];
+    let third = first.cross(second).normalized().expect("the directions are random");
+    let half = [0; 3].map(|_| random.range(0.05, 0.2));
+    let along = Vec3([1.0, random.range(-0.3, 0.3), random.range(-0.15, 0.15)]).normalized().expect("along x");
+    let above = Vec3([0.0, 0.0, Vec3(half).norm() + 0.25]);
+    let from = above - along * random.range(0.3, 0.7);
+    format!(
+        r#"
+gravity = [0, 0, -9.81]
+[point]
+a = {:?}
+b = {:?}
+[section.s]
+EA = 1e5
+GA = 5e4
+GJ = 100
+EI = 100
+rhoA = 0.5
+rhoJ = [1e-4, 5e-5, 5e-5]
+[[beam]]
+name = "rod"
+section = "s"
+through = ["a", "b"]
+elements = {elements}
+order = {order}
+[[surface]]
+name = "box"
+kind = "box"
+at = [0, 0, 0]
+half = {half:?}
+axes = [{:?}, {:?}]
+[[contact]]
+name = "hit"
+beams = ["rod"]
+surfaces = ["box"]
+radius = 0.02
+stiffness = 1e4
+penetration = 0.01
+[output]
+columns = ["energy", "contact"]
+[[stage]]
+kind = "dynamic"
+end = 0.4
+step = 2.5e-4
+"#,
+        from.0,
+        (from + along).0,
+        first.0,
+        third.0
+    )
+}
+
+/// Edges of a box are touched between nodes, too: energy is kept, and no rod passes through.
+#[test]
+fn rods_that_fall_on_boxes_keep_their_energy() {
+    let mut random = Random::new(11);
+    for case in 0..12 {
+        let simulation = simulate(&rod_on_box(&mut random));
+        let total = simulation.column("energy.total");
+        let kinetic = simulation.column("energy.kinetic").into_iter().fold(0.0, f64::max);
+        let drift = total.iter().map(|e| (e - total[0]).abs()).fold(0.0, f64::max) / kinetic;
+        let touched = simulation.column("energy.contact").into_iter().fold(0.0, f64::max);
+        let gap = simulation.column("hit.gap").into_iter().fold(f64::INFINITY, f64::min);
+        println!("case {case}: energy drifts by {drift:.1e}, least gap {gap:.4}");
+        assert!(touched > 0.01 * kinetic && drift < 5e-3, "case {case}: {touched} {drift}");
+        assert!(gap > -0.018, "case {case}: {gap}");
+    }
+}
+
+/// A drum with a radial arm winds up a cable by a third of a turn, in a few load levels; its hub
+/// carries the load at the free end.
+const WINCH: &str = r#"
+[param]
+R = 0.1
+r = 0.005
+out = "R + r"
+turns = 0.3
+T = 50.0
+EI = 0.02
+n = 30
+
+[point]
+hub = [0, 0, 0]
+start = ["out", 0, 0]
+weight = ["out", 0, "-(2*pi*turns*out + 0.3)"]
+
+[section.cable]
+EA = 1e5
+GA = 1e4
+GJ = 0.02
+EI = "EI"
+
+[section.spoke]
+EA = 1e7
+GA = 1e7
+GJ = 1e4
+EI = 1e4
+
+[[beam]]
+name = "spoke"
+section = "spoke"
+through = ["hub", "start"]
+elements = 1
+axis3 = [0, 1, 0]
+
+[[beam]]
+name = "cable"
+section = "cable"
+through = ["start", "weight"]
+elements = "n"
+order = 1
+axis3 = [0, 1, 0]
+
+[[motion]]
+at = "hub"
+rotate = [0, -1, 0]
+angle = "2*pi*turns"
+stages = [2]
+
+[[support]]
+at = "hub"
+fix = ["ux", "uy", "uz"]
+
+[[support]]
+at = "hub"
+fix = ["rx", "ry", "rz"]
+stages = [1]
+
+[[support]]
+at = "weight"
+fix = ["uy", "rz"]
+
+[[load]]
+at = "weight"
+force = [0, 0, "-T"]
+
+[[surface]]
+name = "drum"
+kind = "cylinder"
+from = [0, -1, 0]
+to = [0, 1, 0]
+radius = "R"
+on = "hub"
+
+[[contact]]
+name = "wind"
+beams = ["cable"]
+surfaces = ["drum"]
+radius = "r"
+friction = 0.2
+penetration = 1e-5
+
+[[stage]]
+kind = "static"
+steps = 2
+
+[[stage]]
+kind = "static"
+steps = 12
+
+[output]
+nodes = ["hub", "weight"]
+columns = ["reaction", "contact"]
+"#;
+
+/// Each accepted level is in equilibrium, also where the stiffness of contacts grows for the next one.
+#[test]
+fn levels_with_friction_are_in_equilibrium() {
+    let simulation = simulate(WINCH);
+    let held = simulation.column("hub.fz");
+    let load = simulation.column("load");
+    assert!(simulation.counters.contacts.augmentations > 20);
+    for (row, (held, load)) in held.iter().zip(load).enumerate() {
+        // The second stage follows the start and two levels.
+        let wanted = if row < 3 { 50.0 * load } else { 50.0 };
+        assert!((held - wanted).abs() < 1e-5, "row {row}, load factor {load}: {held}");
+    }
 }

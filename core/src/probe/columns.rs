@@ -576,6 +576,11 @@ impl Quantity {
         }
     }
 
+    /// True if it changes in jumps from one node to the next, so that it has no order of errors.
+    pub fn jumps(self) -> bool {
+        matches!(self, Self::ContactLength | Self::ContactPoints | Self::Stage)
+    }
+
     /// Order at which its error falls with the width of elements.
     pub fn mesh_error(self) -> MeshError {
         match self {

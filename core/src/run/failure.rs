@@ -35,6 +35,8 @@ pub struct Attempts {
     pub cutbacks: u64,
     /// Round-off takes the stiffness of the softest motion.
     pub soft: bool,
+    /// Contacts touch in the last balance.
+    pub touches: bool,
 }
 
 /// A failure of a run, with its numbers.

@@ -82,6 +82,9 @@ impl<'a> Has<'a> {
             let cures = [self.damping(), Some("take a smaller `step`".into()), mesh.map(|mesh| format!("use {mesh}"))];
             return format!("smaller steps were tried: {}", any_of(cures));
         }
+        if tried.touches {
+            return self.hint_of_contact();
+        }
         if work.load_levels().is_some() && work.follows_path() {
             return "shorter increments were tried: the mesh may be too coarse where the curvature is largest, or a \
                     branch may cross the path (a small lateral force selects one)"
@@ -114,6 +117,23 @@ impl<'a> Has<'a> {
                 format!("smaller load levels and arc length were tried: {cures}")
             }
         }
+    }
+
+    /// A cure where contacts touch and a load level fails.
+    fn hint_of_contact(&self) -> String {
+        let cures = any_of([
+            Some("prescribe its motion in place of the load".to_string()),
+            self.fall().map(|_| "let it slide in a dynamic stage".to_string()),
+        ]);
+        let others = any_of([
+            self.levels(),
+            Some("use a smaller `stiffness` of the contact".into()),
+            self.has_beams().then(|| "use more `elements` near the contact".into()),
+        ]);
+        format!(
+            "smaller load levels and softer contacts were tried: a part that slides under a load which friction cannot \
+             hold has no balance ({cures}); otherwise {others}"
+        )
     }
 
     fn hint_of_turns(&self) -> String {

@@ -26,7 +26,11 @@ impl StageRun<'_> {
                 residual: residual.value.norm(),
                 force: residual.force,
                 history,
-                tried: Attempts { cutbacks: self.counters.cutbacks - self.cutbacks_before, soft: self.soft },
+                tried: Attempts {
+                    cutbacks: self.counters.cutbacks - self.cutbacks_before,
+                    soft: self.soft,
+                    touches: self.good.contacts.touches(),
+                },
             },
             NewtonFailure::StepTooSmall { slot, error, share } => {
                 Failure::StepTooSmall { at, place: Place::of(self.model, slot, Vec3::ZERO), error, share }

@@ -78,10 +78,13 @@ impl StageRun<'_> {
         }
     }
 
-    /// A stage that ends at rest takes kinetic energy away from what moved before.
-    /// Warns of a static stage that ends with penetrations between the points of contact.
+    /// Warns of a static stage that ends with penetrations between the points of contact. Those at
+    /// such points are failures.
     pub fn warn_of_hidden_penetration(&mut self) {
         let Some(contacts) = self.model.contacts() else { return };
+        if contacts.penetrates(self.state).is_some() {
+            return;
+        }
         let Some(Penetration { contact, surface, depth, .. }) = contacts.hidden_penetration(self.state) else { return };
         let stage = self.number + 1;
         let message = format!(
@@ -91,6 +94,7 @@ impl StageRun<'_> {
         self.warn(WarningKind::HiddenPenetration, message);
     }
 
+    /// A stage that ends at rest takes kinetic energy away from what moved before.
     pub fn warn_of_standstill(&mut self) {
         let (Some(first), true) = (self.bookkeeper.first(), self.plan.energy && self.past.moving) else { return };
         let share = (self.bookkeeper.ledger().total() - first) / self.bookkeeper.scale();

@@ -20,8 +20,11 @@ pub enum ContactRegime {
 pub struct ContactMemory {
     /// The law of normal forces
     pub regime: ContactRegime,
-    /// Factor on the first stiffness of contacts with which a load level begins
+    /// Factor on the first stiffness of contacts with which the present load level began: that of
+    /// elastic stick
     pub first_factor: f64,
+    /// Factor on the first stiffness with which the next load level begins
+    pub next_factor: f64,
     /// Present factor on the first stiffness of contacts
     pub factor: f64,
     /// True if points that slid go on sliding in the first tangent of a level
@@ -44,6 +47,7 @@ impl Default for ContactMemory {
         Self {
             regime: ContactRegime::Augmented,
             first_factor: 1.0,
+            next_factor: 1.0,
             factor: 1.0,
             goes_on: true,
             dissipated: 0.0,
@@ -77,6 +81,8 @@ pub struct ChainMemory {
 pub struct PointMemory {
     /// Its place: the number of its element plus the part of that element before it
     pub place: f64,
+    /// The number of the edge of a box that it touches; otherwise it touches the whole surface
+    pub edge: Option<u8>,
     /// p, the normal force
     pub force: f64,
     /// L of the next evaluation in static stages, with which the force of an accepted state is p

@@ -27,7 +27,8 @@ pub(super) use estimate::{divisor_in_time, divisors_in_space, left_by_newton};
 use super::StudyError;
 use super::change::Change;
 use super::cost::{Family, Mesher, Original, Pace, Patience, Pool, Sampler, StudyOptions, Variant};
-use crate::deck::{Accuracy, Beam, Deck, InterpolationWord, StageBody};
+use super::scale::jumps;
+use crate::deck::{Accuracy, Beam, Deck, Diagnostic, InterpolationWord, StageBody};
 use crate::scene::Scene;
 use crate::study::Outcome;
 use beamsim_core::run::Failure;
@@ -194,11 +195,16 @@ fn first_pace(deck: &Deck) -> Pace {
     Pace::Steps(factor.min(FIRST_STEP))
 }
 
-/// The numbers of the columns of which an accuracy is wanted.
+/// The numbers of the columns of which an accuracy is wanted: all that have one, if none are named.
 fn outputs(wanted: &Accuracy, scene: &Scene) -> Result<Vec<usize>, StudyError> {
     let columns = super::outcome::columns(scene);
     for name in wanted.columns() {
-        super::outcome::find_column(&columns, name)?;
+        let column = super::outcome::find_column(&columns, name)?;
+        if jumps(&columns[column]) {
+            let message = format!("`{}` changes in jumps: no error of it can be estimated", name.value);
+            return Err(Diagnostic::error(message, name.span.clone()).into());
+        }
     }
-    Ok((0..columns.len()).filter(|&k| wanted.of(&columns[k]).is_finite()).collect())
+    let has_bound = |column: &String| wanted.of(column).is_finite() && !jumps(column);
+    Ok((0..columns.len()).filter(|&k| has_bound(&columns[k])).collect())
 }

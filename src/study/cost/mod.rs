@@ -36,6 +36,7 @@ use crate::output::HistoryReader;
 use crate::scene::Scene;
 use crate::study::StudyError;
 use crate::study::outcome::{Outcome, StageClock, columns, find_column};
+use crate::study::scale::jumps;
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 use grid::Grid;
@@ -219,10 +220,12 @@ fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
     Ok(())
 }
 
-/// The numbers of the columns whose error counts.
+/// The numbers of the columns whose error counts: all that have one, if none are named.
 fn outputs(deck: &Deck, scene: &Scene) -> Result<Vec<usize>, Diagnostic> {
     let columns = columns(scene);
-    let Some(names) = &deck.cost.outputs else { return Ok((0..columns.len()).collect()) };
+    let Some(names) = &deck.cost.outputs else {
+        return Ok((0..columns.len()).filter(|&k| !jumps(&columns[k])).collect());
+    };
     names.iter().map(|name| find_column(&columns, name)).collect()
 }
 

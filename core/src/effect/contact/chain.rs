@@ -1,13 +1,14 @@
 //! A beam or a body against one surface: its nodes, and its candidates for contact.
 //!
 //! The candidates of a state are the closest points between the ends of elements
-//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. Elements from which
-//! the surface is farther than they reach have none: the distance changes by no more than a point
-//! moves.
+//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. At a box the closest
+//! points to its edges are candidates as well ([`crate::kernel::contact::edge`]). Elements from
+//! which the surface is farther than they reach have none: the distance changes by no more than a
+//! point moves.
 
 use crate::kernel::MAX_NODES;
 use crate::kernel::contact::along::weighted_sum;
-use crate::kernel::contact::{Carrier, Minima, Minimum, MinimumKind, Place, Shape, ShapeAt, Side, Surface, minima};
+use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
 use crate::system::{ChainMemory, Node, State};
 use crate::tensor::Vec3;
 
@@ -20,10 +21,6 @@ const REACH: [f64; MAX_NODES + 1] = [1.0, 1.0, 1.0, 1.25, 1.64];
 
 /// Gaps below this part of the radius are looked at.
 const MARGIN: f64 = 1e-5;
-
-/// Equal parts of an element at whose ends gaps from a box are looked at: its edges may lie between
-/// nodes.
-const PARTS_AT_BOXES: usize = 8;
 
 /// Beams without end caps touch with the rim of their end: the surface is nearest beside the end,
 /// not beyond it, if the cosine between its direction and the beam is below this.
@@ -81,9 +78,19 @@ pub(super) struct Candidate {
     pub s: f64,
     /// At a node, or at the closest point
     pub place: Place,
+    /// The number of the edge of a box that it may touch; otherwise it may touch the whole surface
+    pub edge: Option<u8>,
 }
 
 impl Candidate {
+    /// The distance of a point at its place from what it may touch; `None` where that has no normal.
+    pub fn distance(&self, surface: &Surface, y: Vec3) -> Option<Distance> {
+        match self.edge {
+            Some(number) => surface.edge(number)?.distance(y).ok(),
+            None => surface.distance(y).ok(),
+        }
+    }
+
     /// Its place in the chain, counted in elements.
     pub fn along(&self) -> f64 {
         self.element as f64 + self.s
@@ -144,20 +151,11 @@ impl Chain {
         (next as f64 - 1.0 + (fraction - from) / (to - from)) / self.order as f64
     }
 
-    /// The least gap of nodes and closest points, and at boxes of places between nodes; infinite
-    /// where nothing is there to touch.
+    /// The least gap of nodes and closest points; infinite where nothing is there to touch.
     pub(super) fn least_gap(&self, surface: &Surface, carrier: &Carrier, at: &State) -> f64 {
         let places = self.seen(carrier, at);
         let gap = |place: Vec3| surface.value(place, self.radius).map_or(f64::INFINITY, |value| value - self.radius);
-        let mut nodes = places.iter().map(|place| gap(*place)).fold(f64::INFINITY, f64::min);
-        if matches!(surface.shape, Shape::Box { .. }) && self.order == 1 {
-            let part = |k: usize| k as f64 / PARTS_AT_BOXES as f64;
-            let between = |ends: &[Vec3]| {
-                let inner = (1..PARTS_AT_BOXES).map(|k| gap(ends[0] + (ends[1] - ends[0]) * part(k)));
-                inner.fold(f64::INFINITY, f64::min)
-            };
-            nodes = places.windows(2).map(between).fold(nodes, f64::min);
-        }
+        let nodes = places.iter().map(|place| gap(*place)).fold(f64::INFINITY, f64::min);
         let seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0) };
         let elements = 0..if self.order == 0 { 0 } else { self.elements() };
         elements.flat_map(|k| seen.closest(k)).map(gap).fold(nodes, f64::min)
@@ -212,7 +210,8 @@ impl Chain {
         gap > 0.0 && REACH[self.order + 1] * square.sqrt() < gap
     }
 
-    /// The number of the last point in memory of each candidate: the nearest ones first, each once.
+    /// The number of the last point in memory of each candidate that touches the same thing: the
+    /// nearest ones first, each once.
     pub(super) fn matched(&self, candidates: &[Candidate], memory: Option<&ChainMemory>) -> Vec<Option<usize>> {
         let mut partner = vec![None; candidates.len()];
         let Some(memory) = memory else { return partner };
@@ -224,7 +223,8 @@ impl Chain {
                 first += 1;
             }
             let near = memory.points[first..].iter().take_while(|point| point.place <= along + LARGEST_SHIFT);
-            pairs.extend(near.enumerate().map(|(j, point)| ((point.place - along).abs(), k, first + j)));
+            let alike = near.enumerate().filter(|(_, point)| point.edge == candidate.edge);
+            pairs.extend(alike.map(|(j, point)| ((point.place - along).abs(), k, first + j)));
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
         let mut taken = vec![false; memory.points.len()];
@@ -292,28 +292,31 @@ impl SeenChain<'_> {
         is_free
     }
 
-    fn minima(&self, k: usize) -> Minima {
-        let distance = |y: Vec3| self.surface.distance(y).ok();
+    fn minima(&self, k: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> Minima {
         match self.places_of(k) {
-            [a, b] => minima(&[*a, *b], &distance),
-            [a, b, c] => minima(&[*a, *b, *c], &distance),
-            [a, b, c, d] => minima(&[*a, *b, *c, *d], &distance),
+            [a, b] => minima(&[*a, *b], distance),
+            [a, b, c] => minima(&[*a, *b, *c], distance),
+            [a, b, c, d] => minima(&[*a, *b, *c, *d], distance),
             _ => Minima::default(),
         }
     }
 
-    /// The places of all closest points between the ends of element `k`.
-    fn closest(&self, k: usize) -> Vec<Vec3> {
-        let places = self.places_of(k);
-        let found = self.minima(k);
-        let place = |s: f64| match places {
+    /// The place of a point of element `k`.
+    fn place(&self, k: usize, s: f64) -> Vec3 {
+        match self.places_of(k) {
             [a, b] => weighted_sum(&ShapeAt::<2>::new(s).values, |i| [*a, *b][i]),
             [a, b, c] => weighted_sum(&ShapeAt::<3>::new(s).values, |i| [*a, *b, *c][i]),
             [a, b, c, d, ..] => weighted_sum(&ShapeAt::<4>::new(s).values, |i| [*a, *b, *c, *d][i]),
             [a] => *a,
             [] => Vec3::ZERO,
-        };
-        found.found().iter().map(|minimum| place(minimum.s)).collect()
+        }
+    }
+
+    /// The places of all closest points between the ends of element `k`.
+    fn closest(&self, k: usize) -> Vec<Vec3> {
+        let of_surface = self.minima(k, &|y| self.surface.distance(y).ok());
+        let of_edges = self.closest_to_edges(k).into_iter().map(|candidate| candidate.s);
+        of_surface.found().iter().map(|minimum| minimum.s).chain(of_edges).map(|s| self.place(k, s)).collect()
     }
 
     /// Adds the closest points between the ends of element `k`; true if some of them carry the
@@ -321,16 +324,39 @@ impl SeenChain<'_> {
     /// from the place where it is.
     fn add_minima(&self, k: usize, candidates: &mut Vec<Candidate>) -> bool {
         let mut is_sharp = false;
-        for &Minimum { s, kind } in self.minima(k).found() {
+        for &Minimum { s, kind } in self.minima(k, &|y| self.surface.distance(y).ok()).found() {
             let place = match kind {
                 MinimumKind::Sharp => Place::Closest,
                 MinimumKind::Kink if self.surface.side == Side::Outside => Place::Fixed,
                 MinimumKind::Kink | MinimumKind::Conforming => continue,
             };
+            // Those at edges and corners are found by the distance from the edge.
+            if place == Place::Closest && !self.surface.edges().is_empty() {
+                continue;
+            }
             is_sharp |= place == Place::Closest;
-            candidates.push(Candidate { element: k, s, place });
+            candidates.push(Candidate { element: k, s, place, edge: None });
         }
+        candidates.extend(self.closest_to_edges(k));
         is_sharp
+    }
+
+    /// The closest points of element `k` to the edges of a box. Nodes beside them may touch a face.
+    fn closest_to_edges(&self, k: usize) -> Vec<Candidate> {
+        let mut found = Vec::new();
+        for number in self.surface.edges() {
+            let Some(edge) = self.surface.edge(number) else { continue };
+            let minima = self.minima(k, &|y| edge.distance(y).ok());
+            let sharp = minima.found().iter().filter(|minimum| minimum.kind == MinimumKind::Sharp);
+            let beside = sharp.filter(|minimum| edge.is_beside(self.place(k, minimum.s)));
+            found.extend(beside.map(|minimum| Candidate {
+                element: k,
+                s: minimum.s,
+                place: Place::Closest,
+                edge: Some(number),
+            }));
+        }
+        found
     }
 
     /// Adds the nodes of near elements that are not beside a closest point.
@@ -347,7 +373,7 @@ impl SeenChain<'_> {
                 continue;
             }
             let s = if order == 0 { 0.0 } else { (k - to * order) as f64 / order as f64 };
-            candidates.push(Candidate { element: to, s, place: Place::Fixed });
+            candidates.push(Candidate { element: to, s, place: Place::Fixed, edge: None });
         }
     }
 

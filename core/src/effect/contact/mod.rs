@@ -282,7 +282,7 @@ impl<'a> ChainNow<'a> {
         let first = candidate.element * self.chain.order;
         let nodes: [ContactNode; N] = std::array::from_fn(|i| self.node(&nodes[i], first + i, law.friction.is_some()));
         let place = (0..N).fold(Vec3::ZERO, |sum, i| sum + nodes[i].place * shape.values[i]);
-        let distance = self.surface.surface.distance(self.carrier.on_surface(place)).ok()?;
+        let distance = candidate.distance(&self.surface.surface, self.carrier.on_surface(place))?;
         Some(add_point(&nodes, &shape, &self.carrier, &distance, law, weights, out))
     }
 
@@ -317,7 +317,7 @@ impl<'a> ChainNow<'a> {
                     stiffness: stiffness.augmented * contacts.factor,
                     touching: TOUCHING * self.laws.penetration,
                 };
-                (normal, stiffness.augmented * contacts.first_factor)
+                (normal, stiffness.augmented)
             }
             ContactRegime::Penalty => {
                 let normal = NormalLaw::Penalty { stiffness: stiffness.penalty, damping: self.laws.damping, toe: 0.0 };
@@ -351,13 +351,14 @@ impl<'a> ChainNow<'a> {
         let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
         let gap = state.gap + law.radius - self.chain.radius;
         let force = state.normal_force.force;
-        // Stages go on with the first stiffness.
-        let first = self.chain.stiffness[candidate.element].augmented * self.at.contacts.first_factor;
+        // The next level begins with a stiffness of its own.
+        let first = self.chain.stiffness[candidate.element].augmented * self.at.contacts.next_factor;
         let multiplier = if accepts { force + first * gap } else { force };
         let is_penalty = self.at.contacts.regime == ContactRegime::Penalty;
         let before = point.partner.filter(|_| is_penalty);
         PointMemory {
             place: candidate.along(),
+            edge: candidate.edge,
             force,
             multiplier,
             gap,
@@ -568,7 +569,9 @@ impl Contacts for SurfaceContacts {
         let passed = at.time - before.time;
         at.contacts.dissipated += dissipated + 0.5 * (at.contacts.damping_power + power) * passed;
         at.contacts.damping_power = power;
-        at.contacts.factor = at.contacts.first_factor;
+        // Not before: friction of the accepted state has the stiffness of its own level.
+        at.contacts.first_factor = at.contacts.next_factor;
+        at.contacts.factor = at.contacts.next_factor;
     }
 
     fn change(&self, before: &State, at: &State) -> ContactChange {
@@ -670,7 +673,7 @@ impl Contacts for SurfaceContacts {
                 let points = at.contacts.chains.get(number).filter(|_| laws.rubs()).map_or(&[][..], |m| &m.points);
                 for point in points {
                     let element = (point.place as usize).min(chain.elements() - 1);
-                    let first = chain.stiffness[element].augmented * at.contacts.first_factor;
+                    let first = chain.stiffness[element].augmented;
                     energy += point.traction.squared() / (2.0 * laws.stick * first);
                 }
             }

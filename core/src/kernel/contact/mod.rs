@@ -3,7 +3,7 @@
 //! Sections are round with a radius r for contact, whatever their stiffness. A contact adds f =
 //! dW/dq, in the sign of internal forces (g = f_int + f_acc - f_ext), and K = df/dq.
 //!
-//! Order of reading: [`surface`] and [`tube`] (distance, normal and curvature of rigid surfaces),
+//! Order of reading: [`surface`], [`edge`], [`tube`] (distance, normal and curvature of rigid surfaces),
 //! [`law`] (normal force of a gap), [`friction`] (traction by return mapping), [`point`] (forces
 //! and tangent of one contact point), [`along`] (closest points that move along an element).
 //!
@@ -12,6 +12,7 @@
 pub mod along;
 pub mod cone;
 pub mod distance;
+pub mod edge;
 pub mod friction;
 pub mod law;
 pub mod minimum;
@@ -28,6 +29,7 @@ mod tests;
 pub use along::{MAX_MINIMA, Minima, Minimum, MinimumKind, ShapeAt, minima};
 pub use cone::Cone;
 pub use distance::{Distance, Feature, Undefined};
+pub use edge::Edge;
 pub use friction::{CarriedTraction, FrictionLaw, Status, Traction};
 pub use law::{NormalForce, NormalLaw};
 pub use point::{Carrier, ContactLaw, Place, PointState, add_point};

@@ -158,7 +158,8 @@ fn plane<T: Real>(y: Vec3<T>, point: Vec3, normal: Vec3) -> Distance<T> {
     Distance { value, normal, curvature: Mat3::zero(), feature: Feature::Face }
 }
 
-fn cylinder<T: Real>(d: Vec3<T>, axis: Vec3, radius: f64) -> Result<Distance<T>, Undefined> {
+/// The distance from a cylinder, for the place `d` of the point from a point of its axis.
+pub(super) fn cylinder<T: Real>(d: Vec3<T>, axis: Vec3, radius: f64) -> Result<Distance<T>, Undefined> {
     let e = Vec3::constant(axis);
     let q = d - e * e.dot(d);
     let l = q.norm();

@@ -69,10 +69,11 @@ impl Dynamics<'_, '_> {
         if deepest > 1.0 {
             // Penetrations of an impact fall with the root of the stiffness.
             let message = format!(
-                "stage {stage}: contacts penetrate by up to {deepest:.3} times `penetration`: a `stiffness` {:.3} times \
-                 as large, with a `step` {:.3} times as long, would keep it",
-                deepest * deepest,
-                1.0 / deepest
+                "stage {stage}: contacts penetrate by up to {} times `penetration`: a `stiffness` {} times as large, \
+                 with a `step` {} times as long, would keep it",
+                two_digits(deepest),
+                two_digits(deepest * deepest),
+                two_digits(1.0 / deepest)
             );
             self.stage.warn(WarningKind::ContactPenetration, message);
         }
@@ -171,4 +172,9 @@ fn round_down(x: f64) -> f64 {
     };
     // As text, so that it is the number that is meant.
     format!("{rounded}e{power}").parse().unwrap_or(x)
+}
+
+/// A value rounded to two digits.
+fn two_digits(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
 }

@@ -79,6 +79,7 @@ impl StageRun<'_> {
     fn set_first_factor(&mut self, factor: f64) {
         for contacts in [&mut self.good.contacts, &mut self.state.contacts] {
             contacts.first_factor = factor;
+            contacts.next_factor = factor;
             contacts.factor = factor;
         }
     }
@@ -131,8 +132,8 @@ impl StageRun<'_> {
         self.contact_change = contacts.change(self.good, self.state);
         self.counters.contacts.changes += u64::from(self.contact_change != ContactChange::None);
         if augmentations >= MANY_AUGMENTATIONS {
-            let first_factor = (self.good.contacts.first_factor * GROWTH).min(STIFFEST_START);
-            self.state.contacts.first_factor = first_factor;
+            let grown = self.good.contacts.first_factor * GROWTH;
+            self.state.contacts.next_factor = grown.min(STIFFEST_START);
         }
         Ok(())
     }

@@ -1,0 +1,142 @@
+//! The edges of a box that beams touch from outside.
+//!
+//! A beam that lies across a box touches its edges, also where the distance from the box has no
+//! minimum along the beam, as over a face that the beam is parallel to. Each edge is touched at the
+//! closest point to it, with its middle m, its direction e and half of its length h:
+//!
+//! ```text
+//! z = e.(y-m);  |z| <= h: d = (I-ee)(y-m), H = (I-ee-nn)/l;  else: d = y-m-eh sign z, H = (I-nn)/l
+//! l = |d|, phi = l, n = d/l
+//! ```
+//!
+//! Beside the edge this is the distance from the box ([`super::surface`]); over its faces it is
+//! larger. A beam at a corner touches up to three edges there: the energy of each is a continuous
+//! function of the motion, also where the closest point passes from an edge to a corner.
+
+use super::distance::{Distance, Feature, Undefined, sphere};
+use super::surface::{Shape, Side, Surface, cylinder};
+use crate::scalar::Real;
+use crate::tensor::Vec3;
+
+/// Number of edges of a box.
+const EDGES: u8 = 12;
+
+/// An edge of a box, in the axes of the surface's carrier.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    middle: Vec3,
+    /// Its direction
+    along: Vec3,
+    /// Half of its length
+    half: f64,
+    /// The normals of its two faces
+    normals: [Vec3; 2],
+    /// Half lengths of the box along them
+    depths: [f64; 2],
+}
+
+impl Surface {
+    /// Numbers of the edges that beams outside can touch.
+    pub fn edges(&self) -> std::ops::Range<u8> {
+        let is_touched = matches!(self.shape, Shape::Box { .. }) && self.side == Side::Outside;
+        0..if is_touched { EDGES } else { 0 }
+    }
+
+    /// The edge with a number; `None` for other surfaces than boxes.
+    pub fn edge(&self, number: u8) -> Option<Edge> {
+        let Shape::Box { centre, axes, half } = &self.shape else { return None };
+        let along = usize::from(number) / 4;
+        let others = [(along + 1) % 3, (along + 2) % 3];
+        let signs = [1, 2].map(|bit| if number & bit == 0 { 1.0 } else { -1.0 });
+        let normals = [0, 1].map(|k| axes.column(others[k]) * signs[k]);
+        let depths = others.map(|axis| half[axis]);
+        let middle = *centre + normals[0] * depths[0] + normals[1] * depths[1];
+        Some(Edge { middle, along: axes.column(along), half: half[along], normals, depths })
+    }
+}
+
+impl Edge {
+    /// The distance of the point `y` from the edge.
+    pub fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
+        let d = y - Vec3::constant(self.middle);
+        let along = Vec3::constant(self.along).dot(d).largest();
+        if along.abs() <= self.half {
+            Ok(Distance { feature: Feature::Edge, ..cylinder(d, self.along, 0.0)? })
+        } else {
+            let corner = self.along * (self.half * along.signum());
+            Ok(Distance { feature: Feature::Corner, ..sphere(d - Vec3::constant(corner), 0.0)? })
+        }
+    }
+
+    /// True if the point `y` is outside of the faces of the edge, and nearer to this edge than to
+    /// those on the other sides of its faces.
+    pub fn is_beside(&self, y: Vec3) -> bool {
+        let d = y - self.middle;
+        let heights = self.normals.map(|normal| normal.dot(d));
+        let is_outside = heights[0] > 0.0 || heights[1] > 0.0;
+        let is_on_its_side = heights[0] >= -self.depths[0] && heights[1] >= -self.depths[1];
+        is_outside && is_on_its_side
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dual::{Random, jacobian, variables};
+    use super::*;
+
+    fn cuboid(random: &mut Random) -> Surface {
+        let shape = Shape::Box { centre: random.vector(0.2), axes: random.rotation(3.0).r, half: [0.4, 0.6, 0.9] };
+        Surface { shape, side: Side::Outside }
+    }
+
+    #[test]
+    fn normals_and_curvatures_are_derivatives() {
+        let mut random = Random(5);
+        let surface = cuboid(&mut random);
+        for number in surface.edges() {
+            let edge = surface.edge(number).unwrap();
+            for _ in 0..50 {
+                let y = random.vector(2.0);
+                let (Ok(exact), Ok(here)) = (edge.distance(variables::<3>(y, 0)), edge.distance(y)) else { continue };
+                let size = 1.0 + here.curvature.max_abs();
+                assert!((Vec3(exact.value.partials) - here.normal).max_abs() < 1e-13 * size);
+                assert!((jacobian(exact.normal, 0) - here.curvature).max_abs() < 1e-13 * size * size);
+            }
+        }
+    }
+
+    /// Beside an edge or a corner its distance is that of the box.
+    #[test]
+    fn edges_and_corners_have_the_distance_of_the_box() {
+        let mut random = Random(8);
+        let surface = cuboid(&mut random);
+        let edges: Vec<Edge> = surface.edges().filter_map(|number| surface.edge(number)).collect();
+        let mut strips = 0;
+        for _ in 0..2000 {
+            let y = random.vector(1.6);
+            let whole = surface.distance(y).unwrap();
+            let beside: Vec<&Edge> = edges.iter().filter(|edge| edge.is_beside(y)).collect();
+            let distances: Vec<f64> = beside.iter().map(|edge| edge.distance(y).unwrap().value).collect();
+            assert!(distances.iter().all(|distance| *distance > whole.value - 1e-14), "{distances:?} {whole:?}");
+            if whole.feature == Feature::Edge {
+                strips += 1;
+                assert!(distances.iter().any(|distance| (distance - whole.value).abs() < 1e-14), "{y:?}");
+            } else if whole.feature == Feature::Corner {
+                let nearest = distances.iter().filter(|distance| (*distance - whole.value).abs() < 1e-14);
+                assert_eq!(nearest.count(), 3, "{y:?}");
+            } else if whole.value < 0.0 {
+                assert!(distances.is_empty());
+            }
+        }
+        assert!(strips > 200, "{strips}");
+    }
+
+    #[test]
+    fn other_surfaces_have_no_edges() {
+        let shape = Shape::Sphere { centre: Vec3::ZERO, radius: 1.0 };
+        let ball = Surface { shape, side: Side::Outside };
+        assert!(ball.edges().is_empty() && ball.edge(0).is_none());
+        let inside = Surface { side: Side::Inside, ..cuboid(&mut Random(1)) };
+        assert!(inside.edges().is_empty());
+    }
+}
