@@ -20,6 +20,7 @@ mod failures;
 mod folder;
 mod graded;
 mod hostile;
+mod import;
 mod invariance;
 mod joints;
 mod laws;
