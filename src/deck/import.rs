@@ -612,6 +612,20 @@ mod tests {
     }
 
     #[test]
+    fn stations_have_angles_and_offsets() {
+        let section = "[[beam]]\nname = \"b\"\nsection = { csv = \"s.csv\" }\n";
+        let file = "s,twist,x3,turn,EA,GA2,GA3,GJ,EI2,EI3\n0,0.1,0.5,0,1,1,1,1,1,1\n2,0.2,0.6,0.3,1,1,1,1,1,1\n";
+        let whole = with(section, file).unwrap();
+        for line in ["twist = [0.1, 0.2]", "turn = [0.0, 0.3]", "offset = [[0.0, 0.5], [0.0, 0.6]]"] {
+            assert!(whole.contains(line), "{whole}");
+        }
+        let twice = with(&format!("{section}twist = [0, 1]\n"), file).unwrap_err();
+        assert!(twice[0].message.contains("`twist` is given in the beam and as columns of s.csv"), "{twice:?}");
+        let spline = with("[[beam]]\nspline = { csv = \"a.csv\" }\n", "x,y,z\n0,0,0\n1,0,0\n").unwrap();
+        assert!(spline.contains("spline = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]"), "{spline}");
+    }
+
+    #[test]
     fn tables_are_known_by_rows_and_fingerprint() {
         let history = "[history.h]\ncsv = \"f.csv\"\n[history.g]\ncsv = \"f.csv\"\n";
         let imported = import(history, &|_| Ok("0,1\n1,2\n".into())).unwrap();
