@@ -21,6 +21,8 @@ pub struct BeamElement {
 pub enum Profile {
     /// Radius
     Circle(f64),
+    /// Widths along n1 and n2
+    Ellipse([f64; 2]),
     /// Outer radius and thickness
     Pipe([f64; 2]),
     /// Widths along n1 and n2
@@ -309,7 +311,10 @@ impl Reader<'_> {
             return Err(wrong("a dimension is negative"));
         }
         let profile = match (shape.as_str(), &found[..]) {
-            ("CIRC", &[radius, ..]) => Profile::Circle(radius),
+            // One number is the radius (Abaqus); two are the widths (CalculiX).
+            ("CIRC", &[radius]) => Profile::Circle(radius),
+            ("CIRC", &[a, b, ..]) if a == b => Profile::Circle(0.5 * a),
+            ("CIRC", &[a, b, ..]) => Profile::Ellipse([a, b]),
             ("PIPE", &[radius, thickness, ..]) => Profile::Pipe([radius, thickness]),
             ("RECT", &[a, b, ..]) => Profile::Rectangle([a, b]),
             ("BOX", &[a, b, t1, t2, t3, t4, ..]) if t1 == t3 && t2 == t4 => Profile::Box([a, b, t1, t2]),

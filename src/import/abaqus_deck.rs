@@ -181,6 +181,7 @@ fn write_section(text: &mut String, model: &Model, section: &BeamSection, name: 
     }
     let keys: Vec<(&str, f64)> = match section.profile {
         Profile::Circle(radius) => vec![("circle", 0.0), ("radius", radius)],
+        Profile::Ellipse([a, b]) => vec![("ellipse", 0.0), ("width", a), ("height", b)],
         Profile::Pipe([radius, thickness]) => vec![("tube", 0.0), ("radius", radius), ("thickness", thickness)],
         Profile::Rectangle([a, b]) => vec![("rectangle", 0.0), ("width", a), ("height", b)],
         Profile::Box([a, b, along_2, along_1]) => {

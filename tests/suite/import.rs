@@ -205,6 +205,14 @@ fn a_cantilever_of_calculix_deflects_by_its_formula() {
 }
 
 #[test]
+fn rounds_have_a_radius_or_two_widths() {
+    let of = |dimensions: &str| abaqus(&CANTILEVER.replace("RECT\n0.1, 0.2", &format!("CIRC\n{dimensions}"))).unwrap();
+    assert!(of("0.1").contains("shape = \"circle\"\nradius = 0.1\n"));
+    assert!(of("0.1, 0.1").contains("shape = \"circle\"\nradius = 0.05\n"));
+    assert!(of("0.1, 0.2").contains("shape = \"ellipse\"\nwidth = 0.1\nheight = 0.2\n"));
+}
+
+#[test]
 fn a_frame_of_abaqus_is_three_beams() {
     let deck = abaqus(&text("frame.inp")).unwrap();
     assert_eq!(deck.matches("[[beam]]").count(), 3, "{deck}");
