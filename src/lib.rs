@@ -6,6 +6,8 @@ pub mod deck;
 
 pub mod scene;
 
+pub mod import;
+
 pub mod output;
 
 pub mod study;

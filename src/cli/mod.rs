@@ -10,6 +10,7 @@ mod effects;
 mod error;
 mod explain;
 mod folders;
+mod import;
 mod json;
 mod load;
 mod manual;
@@ -185,6 +186,12 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
+    /// Write a deck from the files of another program
+    #[command(after_help = "Example:\n  beamsim import beamdyn blade_primary.dat driver.inp --out blade.toml")]
+    Import {
+        #[command(subcommand)]
+        from: import::From,
+    },
     /// Explain a key, a table or a word of the deck, or a column of the results
     #[command(
         after_help = "Examples:\n  beamsim explain stage.scheme\n  beamsim explain cylindrical\n  beamsim explain tip.uz\n  beamsim explain deck"
@@ -236,6 +243,7 @@ pub fn main() -> ExitCode {
         }
         Command::Sweep { wanted } => sweep::sweep(&wanted),
         Command::New { template, out } => new::new(template, out.as_deref()),
+        Command::Import { from } => import::import(&from),
         Command::Explain { name } => explain::explain(&name),
         Command::Schema => schema::schema(),
         Command::Completions { shell } => completions::completions(shell, Arguments::command()),

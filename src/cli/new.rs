@@ -1,9 +1,9 @@
 //! `beamsim new`
 
 use super::console;
+use super::error::CommandError;
 use super::status::Status;
 use crate::deck::SCHEMA;
-use beamsim_core::failure::FailureKind;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -44,24 +44,29 @@ pub fn new(template: Template, out: Option<&Path>) -> Status {
     use clap::ValueEnum;
     let name = template.to_possible_value().map_or(String::new(), |value| value.get_name().to_string());
     let path = out.map_or_else(|| PathBuf::from(format!("{name}.toml")), Path::to_path_buf);
-    let file = OpenOptions::new().write(true).create_new(true).open(&path);
-    match file.and_then(|mut file| file.write_all(template.text().as_bytes())).and_then(|()| schema_beside(&path)) {
+    match write(template.text(), &path) {
+        Ok(()) => Status::Fine,
+        Err(error) => {
+            error.print();
+            error.status()
+        }
+    }
+}
+
+/// Writes a deck with the schema beside it; a file that exists is left as it is.
+pub fn write(text: &str, path: &Path) -> Result<(), CommandError> {
+    let file = OpenOptions::new().write(true).create_new(true).open(path);
+    match file.and_then(|mut file| file.write_all(text.as_bytes())).and_then(|()| schema_beside(path)) {
         Ok(()) => {
             let path = path.display();
             console::line(&format!("{path}: next `beamsim check {path}`, then `beamsim run {path}`"));
-            Status::Fine
+            Ok(())
         }
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-            console::error(
-                FailureKind::Io.name(),
-                &format!("{}: already exists and is not overwritten (use --out for another name)", path.display()),
-            );
-            Status::Io
-        }
-        Err(error) => {
-            console::error(FailureKind::Io.name(), &format!("{}: {error}", path.display()));
-            Status::Io
-        }
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(CommandError::Io(format!(
+            "{}: already exists and is not overwritten (use --out for another name)",
+            path.display()
+        ))),
+        Err(error) => Err(CommandError::Io(format!("{}: {error}", path.display()))),
     }
 }
 

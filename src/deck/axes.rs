@@ -1,6 +1,6 @@
 //! `axes = [[…], […]]`: turned directions of supports, motions and springs.
 
-use super::reader::{Table, kind_of};
+use super::reader::{Context, Item, Table, kind_of};
 use toml::de::DeValue;
 
 /// Two orthonormal directions; the third follows.
@@ -50,6 +50,20 @@ pub(super) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     let scaled = vector.map(|c| c / largest);
     let length = dot(scaled, scaled).sqrt();
     (largest > 0.0).then(|| scaled.map(|c| c / length))
+}
+
+/// A direction as a unit vector.
+pub(super) fn read_direction(table: &Table, key: &str) -> Option<[f64; 3]> {
+    read_unit(table.context, table.required(key)?, key)
+}
+
+/// A vector that is not zero, as a unit vector.
+pub(super) fn read_unit(context: &Context, item: &Item, key: &str) -> Option<[f64; 3]> {
+    let vector = context.vector::<3>(item)?;
+    match unit(vector.value) {
+        Some(unit) => Some(unit),
+        None => context.wrong(vector.span, format!("`{key}` must not be zero")),
+    }
 }
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
 //! `[[beam]]`: centre line, sections and mesh of a beam.
 
+use super::axes::{read_direction, read_unit};
 use super::diagnostic::{Span, Spanned};
 use super::division::{Division, read_divisions, read_elements};
 use super::history::{HistoryUse, read_history_use};
-use super::point::{PointRef, check_name, read_point_list};
-use super::reader::{Context, Item, Table};
+use super::point::{PointRef, check_name, read_point, read_point_list};
+use super::reader::{Context, Item, Table, kind_of};
 use super::words::words;
 use toml::de::DeValue;
 
@@ -15,6 +16,38 @@ pub enum Path {
     Through(Vec<Spanned<PointRef>>),
     /// Start, a point between, end of a circular arc
     Arc([Spanned<PointRef>; 3]),
+    /// A helix about an axis
+    Helix(Box<Helix>),
+    /// A cubic spline
+    Spline(SplinePath),
+}
+
+/// `helix = { … }`
+#[derive(Clone, Debug)]
+pub struct Helix {
+    /// The place at which it starts; its distance from the axis is the radius
+    pub start: Spanned<PointRef>,
+    /// The name of the point at its end, where it has one
+    pub end: Option<Spanned<PointRef>>,
+    /// A point on the axis
+    pub centre: Spanned<PointRef>,
+    /// Direction of the axis, of length one
+    pub axis: [f64; 3],
+    /// Advance along the axis in a turn
+    pub pitch: f64,
+    /// Turns about the axis; negative: the other way round
+    pub turns: f64,
+    /// Place of the table
+    pub span: Span,
+}
+
+/// `spline = […]` with its `tangents`
+#[derive(Clone, Debug)]
+pub struct SplinePath {
+    /// Points on the spline, of which two do not follow one another at one place
+    pub points: Vec<Spanned<PointRef>>,
+    /// Directions at start and end; left out: no curvature there
+    pub tangents: Option<Spanned<[[f64; 3]; 2]>>,
 }
 
 words! {
@@ -68,8 +101,14 @@ pub struct Beam {
     pub numbering: Option<Spanned<Vec<Division>>>,
     /// The vector whose normal part is local axis 3
     pub axis3: Option<Spanned<[f64; 3]>>,
-    /// Angle of the section about axis 1 at start and end
-    pub twist: Option<[f64; 2]>,
+    /// Angle of axes 2 and 3 about axis 1: at start and end, or at the stations
+    pub twist: Option<Spanned<Vec<[f64; 1]>>>,
+    /// Places of the origin of the sections seen from the line, along axes 2 and 3: one, at start
+    /// and end, or at the stations
+    pub offset: Option<Spanned<Vec<[f64; 2]>>>,
+    /// Angle of the sections about axis 1, relative to the axes of the beam: one, at start and end,
+    /// or at the stations
+    pub turn: Option<Spanned<Vec<[f64; 1]>>>,
     /// Interpolation of rotations
     pub interpolation: InterpolationWord,
     /// Strain without stress
@@ -99,29 +138,68 @@ impl Path {
     fn pieces(&self) -> usize {
         match self {
             Self::Through(points) => points.len().saturating_sub(1),
-            Self::Arc(_) => 1,
+            Self::Arc(_) | Self::Helix(_) => 1,
+            Self::Spline(spline) => spline.corners().len() - 1,
+        }
+    }
+
+    /// True if elements approximate the line.
+    pub fn is_curved(&self) -> bool {
+        match self {
+            Self::Through(_) => false,
+            Self::Arc(_) | Self::Helix(_) | Self::Spline(_) => true,
+        }
+    }
+
+    /// The points through which the line goes, as far as the deck gives them.
+    pub fn points(&self) -> Vec<&Spanned<PointRef>> {
+        match self {
+            Self::Through(points) => points.iter().collect(),
+            Self::Arc(points) => points.iter().collect(),
+            Self::Helix(helix) => std::iter::once(&helix.start).chain(&helix.end).collect(),
+            Self::Spline(spline) => spline.points.iter().collect(),
         }
     }
 }
 
+impl SplinePath {
+    /// The numbers of the points at the ends of its pieces: first, last, and those with names.
+    pub fn corners(&self) -> Vec<usize> {
+        let last = self.points.len() - 1;
+        let is_corner = |k: &usize| {
+            let named = matches!(self.points[*k].value, PointRef::Name(_));
+            named || *k == 0 || *k == last
+        };
+        (0..=last).filter(is_corner).collect()
+    }
+}
+
 /// Keys of `[[beam]]`.
-pub(super) const KEYS: [&str; 15] = [
+pub(super) const KEYS: [&str; 20] = [
     "name",
     "section",
     "stations",
     "stations_in",
     "through",
     "arc",
+    "helix",
+    "spline",
+    "tangents",
     "elements",
     "grading",
     "order",
     "numbering",
     "axis3",
     "twist",
+    "offset",
+    "turn",
     "interpolation",
     "free_strain",
     "history",
 ];
+
+/// Keys of `helix`.
+pub(super) const HELIX_KEYS: [&str; 6] = ["start", "end", "centre", "axis", "pitch", "turns"];
 
 pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Beam> {
     let table = Table::new(context, item, "[[beam]]", &KEYS)?;
@@ -137,7 +215,10 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
     let order = table.optional("order", read_order);
     let numbering = table.optional("numbering", |context, item| read_divisions(context, item, "numbering"));
     let axis3 = table.vector("axis3");
-    let twist = table.vector("twist").map(|t| t.value);
+    let count = stations.as_ref().and_then(|stations| stations.as_ref().map(|stations| stations.value.len()));
+    let twist = table.optional("twist", |context, item| read_along(context, item, "twist", count, 2));
+    let offset = table.optional("offset", |context, item| read_along(context, item, "offset", count, 1));
+    let turn = table.optional("turn", |context, item| read_along(context, item, "turn", count, 1));
     let interpolation = table.word_or("interpolation", InterpolationWord::Relative);
     let free_strain = read_free_strain(&table);
     Some(Beam {
@@ -150,7 +231,9 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
         order: order?.unwrap_or(1),
         numbering: numbering?,
         axis3,
-        twist,
+        twist: twist?,
+        offset: offset?,
+        turn: turn?,
         interpolation: interpolation?,
         free_strain: free_strain?,
         span: table.span.clone(),
@@ -218,28 +301,120 @@ fn read_stations(table: &Table, sections: usize) -> Option<Option<Spanned<Vec<f6
     Some(Some(stations))
 }
 
-fn read_path(table: &Table) -> Option<Path> {
-    let context = table.context;
-    match (table.get("through"), table.get("arc")) {
-        (Some(item), None) => {
-            let points = read_point_list(context, item)?;
-            if points.len() < 2 {
-                return context.wrong(item.span(), "`through` needs two or more points");
-            }
-            Some(Path::Through(points))
+/// Entries of N numbers: one for the whole beam where `least` is 1, two for its start and its end,
+/// or as many as there are stations.
+fn read_along<const N: usize>(
+    context: &Context,
+    item: &Item,
+    key: &str,
+    stations: Option<usize>,
+    least: usize,
+) -> Option<Spanned<Vec<[f64; N]>>> {
+    let entry = |item: &Item| match N {
+        1 => Some([context.number(item)?.value; N]),
+        _ => Some(context.vector::<N>(item)?.value),
+    };
+    let is_list = |item: &Item| matches!(item.get_ref(), DeValue::Array(_));
+    let value = match item.get_ref() {
+        DeValue::Array(list) if N == 1 || list.iter().any(is_list) => {
+            list.iter().map(entry).collect::<Vec<_>>().into_iter().collect::<Option<Vec<_>>>()?
         }
-        (None, Some(item)) => {
-            let points = read_point_list(context, item)?;
-            let count = points.len();
-            let Ok(points) = points.try_into() else {
-                let message = format!("`arc` must be [start, any point between, end], found {count} point(s)");
-                return context.wrong(item.span(), message);
-            };
-            Some(Path::Arc(points))
-        }
-        (Some(_), Some(item)) => {
-            context.wrong(item.span(), "a beam takes either `through` (points) or `arc`, not both")
-        }
-        (None, None) => table.wrong("[[beam]] needs `through` (straight pieces) or `arc` (a circular arc)"),
+        _ => vec![entry(item)?],
+    };
+    let found = value.len();
+    if (least..=2).contains(&found) || (found > 2 && Some(found) == stations) {
+        return Some(Spanned { value, span: item.span() });
     }
+    let one = if least == 1 { "one entry, " } else { "" };
+    let many = stations.map_or("as many as `stations`".into(), |count| format!("{count}, one for each of `stations`"));
+    context.wrong(item.span(), format!("`{key}` must have {one}two (at start and end), or {many}; found {found}"))
+}
+
+fn read_path(table: &Table) -> Option<Path> {
+    const LINES: [&str; 4] = ["through", "arc", "helix", "spline"];
+    let given: Vec<&str> = LINES.into_iter().filter(|key| table.has(key)).collect();
+    if !given.contains(&"spline") {
+        table.refuse("tangents", "`tangents` is only allowed with `spline`");
+    }
+    match given[..] {
+        [] => table.wrong("[[beam]] needs `through` (straight pieces), `arc` (a circular arc), `helix` or `spline`"),
+        ["through"] => read_points_of(table, "through").map(Path::Through),
+        ["arc"] => read_arc(table.context, table.get("arc")?),
+        ["helix"] => read_helix(table.context, table.get("helix")?).map(|helix| Path::Helix(Box::new(helix))),
+        ["spline"] => {
+            let points = read_points_of(table, "spline");
+            let tangents = table.optional("tangents", read_tangents);
+            Some(Path::Spline(SplinePath { points: points?, tangents: tangents? }))
+        }
+        [first, second, ..] => {
+            table.wrong_value(second, format!("a beam takes either `{first}` or `{second}`, not both"))
+        }
+        [_] => None,
+    }
+}
+
+/// Two or more points.
+fn read_points_of(table: &Table, key: &str) -> Option<Vec<Spanned<PointRef>>> {
+    let item = table.get(key)?;
+    let points = read_point_list(table.context, item)?;
+    if points.len() < 2 {
+        return table.context.wrong(item.span(), format!("`{key}` needs two or more points"));
+    }
+    Some(points)
+}
+
+fn read_arc(context: &Context, item: &Item) -> Option<Path> {
+    let points = read_point_list(context, item)?;
+    let count = points.len();
+    let Ok(points) = points.try_into() else {
+        let message = format!("`arc` must be [start, any point between, end], found {count} point(s)");
+        return context.wrong(item.span(), message);
+    };
+    Some(Path::Arc(points))
+}
+
+fn read_helix<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Helix> {
+    let table = Table::new(context, item, "helix", &HELIX_KEYS)?;
+    let start = table.required("start").and_then(|item| read_point(context, item));
+    let end = table.optional("end", |context, item| {
+        let name = context.text(item)?;
+        Some(name.map(PointRef::Name))
+    });
+    let centre = match table.get("centre") {
+        Some(item) => read_point(context, item),
+        None => Some(Spanned { value: PointRef::Coordinates([0.0; 3]), span: table.span.clone() }),
+    };
+    let axis = read_direction(&table, "axis");
+    let pitch = table.required_number("pitch");
+    let turns = table.required_number("turns");
+    let turns = turns?;
+    if turns.value == 0.0 {
+        return context.wrong(turns.span, "`turns` must not be zero");
+    }
+    Some(Helix {
+        start: start?,
+        end: end?,
+        centre: centre?,
+        axis: axis?,
+        pitch: pitch?.value,
+        turns: turns.value,
+        span: table.span.clone(),
+    })
+}
+
+/// Directions at start and end of a spline, of length one.
+fn read_tangents(context: &Context, item: &Item) -> Option<Spanned<[[f64; 3]; 2]>> {
+    let DeValue::Array(rows) = item.get_ref() else {
+        return context.wrong(
+            item.span(),
+            format!("`tangents` must be two vectors, at start and end, found {}", kind_of(item.get_ref())),
+        );
+    };
+    if rows.len() != 2 {
+        return context
+            .wrong(item.span(), format!("`tangents` must be two vectors, at start and end, found {}", rows.len()));
+    }
+    let start = read_unit(context, &rows[0], "tangents");
+    let end = read_unit(context, &rows[1], "tangents");
+    Some(Spanned { value: [start?, end?], span: item.span() })
 }

@@ -104,14 +104,24 @@ impl Importer<'_> {
     fn beams(&mut self, document: &mut DocumentMut) {
         let Some(beams) = document.get_mut("beam").and_then(Item::as_array_of_tables_mut) else { return };
         for (number, beam) in beams.iter_mut().enumerate() {
-            if let Some(path) = self.named(beam.get("through"))
-                && let Some(points) = self.table(&path, |table| table.points())
-            {
-                beam.insert("through", Item::Value(points.into()));
+            for key in ["through", "spline"] {
+                if let Some(path) = self.named(beam.get(key))
+                    && let Some(points) = self.table(&path, |table| table.points())
+                {
+                    beam.insert(key, Item::Value(points.into()));
+                }
             }
             if let Some(path) = self.named(beam.get("section"))
-                && let Some(Stations { unit, places: stations, sections }) = self.table(&path, |table| table.sections())
+                && let Some(table) = self.table(&path, |table| table.sections())
             {
+                let Stations { unit, places: stations, sections, along } = table;
+                for (key, values) in along {
+                    if beam.get(key).is_some() {
+                        let message = format!("`{key}` is given in the beam and as columns of {path}");
+                        self.found.push(Diagnostic::error(message, self.place(&path)));
+                    }
+                    beam.insert(key, Item::Value(values.into()));
+                }
                 let name = beam.get("name").and_then(Item::as_str).map_or(number.to_string(), str::to_string);
                 let names: Vec<String> = (1..=stations.len()).map(|k| format!("{name} {k}")).collect();
                 beam.insert("section", Item::Value(names.iter().collect::<Array>().into()));
@@ -242,6 +252,8 @@ struct Stations {
     unit: StationsWord,
     places: Vec<f64>,
     sections: Vec<Table>,
+    /// Keys of the beam with a value for each station
+    along: Vec<(&'static str, Array)>,
 }
 
 /// A table of numbers, with names above it or without.
@@ -385,11 +397,15 @@ impl Csv {
             let line = self.lines[self.rows.len() - 1];
             return Err(format!("line {line}: `fraction` must end at 1 (the end of the beam), found {last}"));
         }
-        let known =
-            |name: &str| ["fraction", "s"].contains(&name) || RESULTANTS.contains(&name) || entry(name).is_some();
+        let known = |name: &str| {
+            ["fraction", "s", "twist", "x2", "x3", "turn"].contains(&name)
+                || RESULTANTS.contains(&name)
+                || entry(name).is_some()
+        };
         if let Some(unknown) = self.names.iter().find(|name| !known(name)) {
             return Err(format!(
-                "`{unknown}` is not a column of a section: columns are {}, or C11 to C66 and M11 to M66",
+                "`{unknown}` is not a column of a section: columns are {}, or C11 to C66 and M11 to M66; and twist, x2, \
+                 x3, turn",
                 RESULTANTS.join(", ")
             ));
         }
@@ -405,7 +421,22 @@ impl Csv {
             return Err("rotary inertia needs the three columns `rhoJ1`, `rhoJ2`, `rhoJ3`".into());
         }
         let sections = self.rows.iter().map(|row| self.section(row)).collect::<Result<_, _>>()?;
-        Ok(Stations { unit, places: self.column(place).collect(), sections })
+        Ok(Stations { unit, places: self.column(place).collect(), sections, along: self.along() })
+    }
+
+    /// Twist of the axes, and offset and turn of the sections, where there are such columns.
+    fn along(&self) -> Vec<(&'static str, Array)> {
+        let mut along = Vec::new();
+        for key in ["twist", "turn"] {
+            along.extend(self.place(key).map(|place| (key, self.column(place).collect())));
+        }
+        let [x2, x3] = ["x2", "x3"].map(|name| self.place(name));
+        if x2.is_some() || x3.is_some() {
+            let at = |row: &Vec<f64>, place: Option<usize>| place.map_or(0.0, |place| row[place]);
+            let offset = |row: &Vec<f64>| Value::from([at(row, x2), at(row, x3)].into_iter().collect::<Array>());
+            along.push(("offset", self.rows.iter().map(offset).collect()));
+        }
+        along
     }
 
     fn section(&self, row: &[f64]) -> Result<Table, String> {
@@ -578,6 +609,20 @@ mod tests {
         }
         let both = with(section, "s,fraction,EA\n0,0,1\n1,1,1\n").unwrap_err();
         assert!(both[0].message.contains("`fraction` or `s`, not both"), "{}", both[0].message);
+    }
+
+    #[test]
+    fn stations_have_angles_and_offsets() {
+        let section = "[[beam]]\nname = \"b\"\nsection = { csv = \"s.csv\" }\n";
+        let file = "s,twist,x3,turn,EA,GA2,GA3,GJ,EI2,EI3\n0,0.1,0.5,0,1,1,1,1,1,1\n2,0.2,0.6,0.3,1,1,1,1,1,1\n";
+        let whole = with(section, file).unwrap();
+        for line in ["twist = [0.1, 0.2]", "turn = [0.0, 0.3]", "offset = [[0.0, 0.5], [0.0, 0.6]]"] {
+            assert!(whole.contains(line), "{whole}");
+        }
+        let twice = with(&format!("{section}twist = [0, 1]\n"), file).unwrap_err();
+        assert!(twice[0].message.contains("`twist` is given in the beam and as columns of s.csv"), "{twice:?}");
+        let spline = with("[[beam]]\nspline = { csv = \"a.csv\" }\n", "x,y,z\n0,0,0\n1,0,0\n").unwrap();
+        assert!(spline.contains("spline = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]"), "{spline}");
     }
 
     #[test]

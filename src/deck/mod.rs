@@ -47,10 +47,11 @@ mod words;
 
 pub use accuracy::{Accuracy, is_named, without_stage};
 pub use axes::Axes;
-pub use beam::{Beam, FreeStrain, InterpolationWord, Path, StationsWord};
+pub use beam::{Beam, FreeStrain, Helix, InterpolationWord, Path, SplinePath, StationsWord};
 pub use body::Body;
 pub use contact::{Contact, ContactDamping, ContactRadius, EndsWord};
 pub use cost::{Cost, NormWord};
+pub use damping::Damping;
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, one_of};
 pub use division::{Division, MOST_ELEMENTS};
 pub use effects::{EffectWord, Effects};
@@ -82,7 +83,7 @@ pub use shown::{hides_text, shown, shown_in_line};
 pub use spring::{Spring, SpringBody};
 pub use stage::{MOST_STEPS, RotatingFrame, STEP_TOLERANCE, Stage, StageBody, Until};
 pub use support::Support;
-pub use surface::{SideWord, Surface, SurfaceBody, SurfaceMotion, SurfacePoint, SurfaceWord};
+pub use surface::{SideWord, Surface, SurfaceBody, SurfaceMotion, SurfacePoint, SurfaceWord, TubeLine};
 pub use sweep::{SweepFile, VaryBody, VaryTable};
 pub use words::Words;
 pub(crate) use words::words;
@@ -126,7 +127,7 @@ pub struct Deck {
     /// Loads
     pub loads: Vec<Load>,
     /// Rayleigh factors of mass and stiffness
-    pub damping: Option<[f64; 2]>,
+    pub damping: Option<Damping>,
     /// Initial velocities
     pub initials: Vec<Initial>,
     /// Histories

@@ -299,6 +299,11 @@ impl<'a> Table<'a> {
         self.context.wrong(self.key_span(key), message)
     }
 
+    /// Reports an error at the value of a key; returns nothing, for use in a tail position.
+    pub fn wrong_value<T>(&self, key: &str, message: impl Into<String>) -> Option<T> {
+        self.context.wrong(self.get(key).map_or(self.span.clone(), |item| item.span()), message)
+    }
+
     /// Reports an error at a key if the table has it.
     pub fn refuse(&self, key: &str, message: impl Into<String>) {
         if self.has(key) {

@@ -1,7 +1,6 @@
 //! `[[surface]]`: rigid surfaces that beams and bodies touch.
 
-use super::axes::{Axes, read_axes, unit};
-use super::beam::Path;
+use super::axes::{Axes, read_axes, read_direction};
 use super::diagnostic::{Span, Spanned};
 use super::history::{HistoryUse, read_history_use};
 use super::point::{PointRef, check_name, read_point, read_point_list};
@@ -33,6 +32,15 @@ pub struct Surface {
 
 /// A point of a surface by its name or its coordinates.
 pub type SurfacePoint = Spanned<PointRef>;
+
+/// The centre line of a tube.
+#[derive(Clone, Debug)]
+pub enum TubeLine {
+    /// Points
+    Through(Vec<SurfacePoint>),
+    /// Start, a point between, end of a circular arc
+    Arc([SurfacePoint; 3]),
+}
 
 /// Shapes of surfaces.
 #[derive(Clone, Debug)]
@@ -88,7 +96,7 @@ pub enum SurfaceBody {
     /// A tube
     Tube {
         /// Its centre line
-        line: Path,
+        line: TubeLine,
         /// True for a spline through the points, false for straight pieces
         smooth: bool,
         /// One radius, or one for each point
@@ -268,13 +276,13 @@ fn read_tube(table: &Table) -> Option<SurfaceBody> {
                 return context.wrong(item.span(), "`through` needs two or more points");
             }
             let count = points.len();
-            (Path::Through(points), count)
+            (TubeLine::Through(points), count)
         }
         (None, Some(item)) => {
             let Ok(points) = read_point_list(context, item)?.try_into() else {
                 return context.wrong(item.span(), "`arc` must be [start, any point between, end]");
             };
-            (Path::Arc(points), 2)
+            (TubeLine::Arc(points), 2)
         }
         (Some(_), Some(item)) => {
             return context.wrong(item.span(), "a tube takes either `through` (points) or `arc`, not both");
@@ -311,15 +319,6 @@ fn read_axis(table: &Table) -> Option<[SurfacePoint; 2]> {
     let from = required_point(table, "from");
     let to = required_point(table, "to");
     Some([from?, to?])
-}
-
-/// A direction as a unit vector.
-fn read_direction(table: &Table, key: &str) -> Option<[f64; 3]> {
-    let vector = table.context.vector::<3>(table.required(key)?)?;
-    match unit(vector.value) {
-        Some(unit) => Some(unit),
-        None => table.context.wrong(vector.span, format!("`{key}` must not be zero")),
-    }
 }
 
 /// `Some(None)` without a motion.

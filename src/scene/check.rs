@@ -129,11 +129,7 @@ fn missing_mass(deck: &Deck, section: &deck::Section) -> Option<Missing> {
 fn warn_of_equal_places(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     let mut used: HashSet<&str> = HashSet::new();
     for beam in &deck.beams {
-        let points = match &beam.path {
-            deck::Path::Through(points) => &points[..],
-            deck::Path::Arc(points) => &points[..],
-        };
-        for point in points {
+        for point in beam.path.points() {
             if let deck::PointRef::Name(name) = &point.value {
                 used.insert(name);
             }

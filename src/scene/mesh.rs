@@ -352,6 +352,7 @@ impl Mesh {
             };
             Diagnostic::error(format!("the last of the `stations` is {last}; it must be {end}"), span)
         })?;
+        let section = section.placed(path::along(beam, beam.offset.as_ref()), path::along(beam, beam.turn.as_ref()));
         let pieces = line.pieces.len();
         for (key, list) in [("elements", Some(&beam.elements)), ("numbering", beam.numbering.as_ref())] {
             let Some(Spanned { value, span }) = list.filter(|l| l.value.len() != 1 && l.value.len() != pieces) else {
@@ -465,6 +466,8 @@ fn corner_names(path: &deck::Path) -> Vec<Option<&str>> {
     match path {
         deck::Path::Through(points) => points.iter().map(name).collect(),
         deck::Path::Arc([start, _, end]) => vec![name(start), name(end)],
+        deck::Path::Helix(helix) => vec![name(&helix.start), helix.end.as_ref().and_then(name)],
+        deck::Path::Spline(spline) => spline.corners().into_iter().map(|k| name(&spline.points[k])).collect(),
     }
 }
 

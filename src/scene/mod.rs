@@ -1,10 +1,12 @@
 //! From a deck to a scene: the one place that sees words and numbers both.
 
+mod along;
 mod check;
 mod compose;
 mod computed;
 mod constraints;
 mod contacts;
+mod curve;
 mod figure;
 mod joints;
 mod memory;
@@ -20,6 +22,7 @@ mod switches;
 
 pub use compose::Reason;
 pub use computed::{Solution, SolvedSection, solved, warning as section_warning};
+pub use curve::{NaturalSpline, Spline};
 pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
 pub use section::matrices as section_matrices;

@@ -1,8 +1,20 @@
-//! Centre lines: straight pieces and circular arcs, and the section axes along them.
+//! Centre lines: straight pieces, arcs, helices and splines, and the section axes along them.
 
+use super::along::Along;
+use super::curve::{Helix, Spline};
 use crate::deck::{self, Diagnostic, PointRef, Span, Spanned};
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// Places of a turn, or of a segment of a spline, at which the tangent is compared with `axis3`.
+const TANGENTS: f64 = 720.0;
+
+/// Places of a curve at which the tangent is compared with `axis3`, at most.
+const MOST_TANGENTS: f64 = 1e5;
+
+/// Least speed of a spline over the sum of its chords: less is a cusp.
+const SLOWEST: f64 = 1e-3;
 
 /// One piece of a centre line.
 #[derive(Clone, Debug)]
@@ -28,6 +40,12 @@ enum Curve {
         e: Vec3,
         f: Vec3,
         angle: f64,
+    },
+    Helix(Helix),
+    /// Arc length from `from` on
+    Spline {
+        spline: Arc<Spline>,
+        from: f64,
     },
 }
 
@@ -85,7 +103,8 @@ pub struct CentreLine {
     pub length: f64,
     /// Arc length before each piece
     before: Vec<f64>,
-    twist: [f64; 2],
+    /// Angle of axes 2 and 3 about axis 1
+    twist: Along<1>,
 }
 
 impl Piece {
@@ -103,6 +122,8 @@ impl Piece {
                 let a = t * angle;
                 *centre + (*e * libm::cos(a) + *f * libm::sin(a)) * *radius
             }
+            Curve::Helix(helix) => helix.place(t),
+            Curve::Spline { spline, from } => spline.place(from + t * self.length),
         }
     }
 
@@ -114,6 +135,8 @@ impl Piece {
                 let a = t * angle;
                 *f * libm::cos(a) - *e * libm::sin(a)
             }
+            Curve::Helix(helix) => helix.tangent(t),
+            Curve::Spline { spline, from } => spline.tangent(from + t * self.length),
         }
     }
 
@@ -123,7 +146,9 @@ impl Piece {
     pub fn slope(&self, stretch: Vec3, cover: Cover) -> (Vec3, f64) {
         match &self.curve {
             Curve::Line => (self.tangent(0.0), cover.of(0.5 * self.length)),
-            Curve::Arc { .. } => (stretch * (1.0 / stretch.norm()), stretch.norm()),
+            Curve::Arc { .. } | Curve::Helix(_) | Curve::Spline { .. } => {
+                (stretch * (1.0 / stretch.norm()), stretch.norm())
+            }
         }
     }
 
@@ -133,7 +158,7 @@ impl Piece {
         match (&self.curve, cover) {
             (Curve::Line, Cover::Equal { count, .. }) => chord.norm() * count as f64 / self.length,
             (Curve::Line, Cover::Between { .. }) => chord.norm() / cover.of(self.length),
-            (Curve::Arc { .. }, _) => 1.0,
+            (Curve::Arc { .. } | Curve::Helix(_) | Curve::Spline { .. }, _) => 1.0,
         }
     }
 
@@ -142,7 +167,7 @@ impl Piece {
         let straight = |i: usize| (self.end - self.start) * cover.way(i, N - 1);
         match &self.curve {
             Curve::Line => std::array::from_fn(straight),
-            Curve::Arc { .. } => places.map(|place| place - places[0]),
+            Curve::Arc { .. } | Curve::Helix(_) | Curve::Spline { .. } => places.map(|place| place - places[0]),
         }
     }
 
@@ -157,7 +182,7 @@ impl Piece {
 
 impl CentreLine {
     /// The line through these pieces.
-    fn new(pieces: Vec<Piece>, twist: [f64; 2]) -> Self {
+    fn new(pieces: Vec<Piece>, twist: Along<1>) -> Self {
         let mut length = 0.0;
         let mut before = Vec::with_capacity(pieces.len());
         for piece in &pieces {
@@ -171,7 +196,7 @@ impl CentreLine {
     /// beam's length.
     pub fn axes(&self, piece: usize, e1: Vec3, s: f64) -> Mat3 {
         let axes = self.pieces[piece].untwisted_axes(e1);
-        let angle = self.twist[0] + (self.twist[1] - self.twist[0]) * s;
+        let [angle] = self.twist.at(s);
         if angle == 0.0 {
             return axes;
         }
@@ -204,6 +229,8 @@ impl CentreLine {
                     let y = (place - *centre).dot(*f);
                     libm::atan2(y, x).rem_euclid(2.0 * PI) / angle
                 }
+                // Only ends of these have names.
+                Curve::Helix(_) | Curve::Spline { .. } => f64::from(near(piece.end)),
             };
             ((0.0..=1.0).contains(&t) && near(piece.place(t))).then(|| self.fraction(number, t))
         })
@@ -236,8 +263,23 @@ pub fn centre_line(
             let [a, b, c] = [place(&points[0])?, place(&points[1])?, place(&points[2])?];
             vec![arc(beam, [a, b, c], given.as_ref(), &points[1].span)?]
         }
+        deck::Path::Helix(path) => vec![helix(beam, path, place, given.as_ref())?],
+        deck::Path::Spline(path) => {
+            let places: Vec<Vec3> = path.points.iter().map(place).collect::<Result<_, _>>()?;
+            spline(beam, path, &places, given.as_ref())?
+        }
     };
-    Ok(CentreLine::new(pieces, beam.twist.unwrap_or([0.0; 2])))
+    Ok(CentreLine::new(pieces, along(beam, beam.twist.as_ref())))
+}
+
+/// Numbers that a beam gives at its start and its end, or at its stations; zero where it gives none.
+pub fn along<const N: usize>(beam: &deck::Beam, values: Option<&Spanned<Vec<[f64; N]>>>) -> Along<N> {
+    let Some(values) = values else { return Along::zero() };
+    let stations = beam.stations.as_ref().map(|stations| {
+        let last = stations.value.last().copied().unwrap_or(1.0);
+        stations.value.iter().map(|station| station / last).collect::<Vec<f64>>()
+    });
+    Along::new(&values.value, stations.as_deref())
 }
 
 fn line(
@@ -247,18 +289,8 @@ fn line(
     axis3: Option<&Spanned<Vec3>>,
     span: &Span,
 ) -> Result<Piece, Diagnostic> {
+    refuse_no_length(beam, start, end, span)?;
     let length = (end - start).norm();
-    let size = start.norm().max(end.norm());
-    if !length.is_finite() {
-        let message =
-            format!("a piece of beam `{}` has a length beyond the range of floating-point numbers", beam.name.value);
-        return Err(Diagnostic::error(message, span.clone()));
-    }
-    if length <= 1e-12 * size || length == 0.0 {
-        let message =
-            format!("a piece of beam `{}` has no length: it starts and ends at the same place", beam.name.value);
-        return Err(Diagnostic::error(message, span.clone()));
-    }
     let tangent = (end - start) * (1.0 / length);
     let along_z = tangent.cross(Vec3::UNIT[2]).norm() < 1e-6;
     let default = if along_z { Vec3::UNIT[1] } else { Vec3::UNIT[2] };
@@ -292,24 +324,136 @@ fn arc(
     let e = (a - centre) * (1.0 / radius);
     let f = normal.cross(e);
     let angle = libm::atan2((c - centre).dot(f), (c - centre).dot(e)).rem_euclid(2.0 * PI);
-    let axis = axis3.map_or(normal, |axis| axis.value);
     let piece = Piece {
         start: a,
         end: c,
         curve: Curve::Arc { centre, radius, e, f, angle },
         length: radius * angle,
-        axis3: axis,
+        axis3: axis3.map_or(normal, |axis| axis.value),
     };
     if let Some(axis) = axis3 {
-        // It must leave a normal part everywhere: look closely enough for any arc.
-        let parallel =
-            |k: i32| piece.tangent(f64::from(k) / 720.0).cross(axis.value).norm() <= 1e-2 * axis.value.norm();
-        if (0..=720).any(parallel) {
-            let message = format!("`axis3` is parallel to the arc of beam `{}` at some point", beam.name.value);
-            return Err(Diagnostic::error(message, axis.span.clone()));
-        }
+        refuse_parallel(beam, &piece, &axis.span)?;
     }
     Ok(piece)
+}
+
+fn helix(
+    beam: &deck::Beam,
+    path: &deck::Helix,
+    place: &dyn Fn(&Spanned<PointRef>) -> Result<Vec3, Diagnostic>,
+    axis3: Option<&Spanned<Vec3>>,
+) -> Result<Piece, Diagnostic> {
+    let name = &beam.name.value;
+    let start = place(&path.start)?;
+    let found = Helix::new(start, place(&path.centre)?, Vec3(path.axis), path.pitch, path.turns);
+    let helix = found.ok_or_else(|| {
+        let message = format!("the helix of beam `{name}` starts on its axis");
+        Diagnostic::error(message, path.start.span.clone())
+            .help("the radius is the distance of `start` from the axis through `centre`")
+    })?;
+    let length = helix.length();
+    refuse_infinite(beam, length, &path.span)?;
+    let mut end = helix.place(1.0);
+    if let Some(point) = &path.end {
+        let given = place(point)?;
+        if (given - end).norm() > 1e-9 * length.max(end.norm()) {
+            let Vec3([x, y, z]) = end;
+            let message = format!("the helix of beam `{name}` does not end at this point");
+            return Err(Diagnostic::error(message, point.span.clone()).help(format!("it ends at [{x}, {y}, {z}]")));
+        }
+        end = given;
+    }
+    let axis = axis3.map_or(helix.axis(), |axis| axis.value);
+    let piece = Piece { start, end, curve: Curve::Helix(helix), length, axis3: axis };
+    refuse_parallel(beam, &piece, axis3.map_or(&path.span, |axis| &axis.span))?;
+    Ok(piece)
+}
+
+fn spline(
+    beam: &deck::Beam,
+    path: &deck::SplinePath,
+    places: &[Vec3],
+    axis3: Option<&Spanned<Vec3>>,
+) -> Result<Vec<Piece>, Diagnostic> {
+    for (k, ends) in places.windows(2).enumerate() {
+        refuse_no_length(beam, ends[0], ends[1], &path.points[k + 1].span)?;
+    }
+    let spline = Arc::new(Spline::new(places, path.tangents.as_ref().map(|tangents| tangents.value.map(Vec3))));
+    let span = &path.points[0].span;
+    if spline.slowest() < SLOWEST {
+        let message = format!("the spline of beam `{}` has a cusp", beam.name.value);
+        return Err(Diagnostic::error(message, span.clone()).help("use more points, in order along the line"));
+    }
+    let corners = path.corners();
+    let piece = |ends: &[usize]| {
+        let from = spline.length_to(ends[0]);
+        let length = spline.length_to(ends[1]) - from;
+        let piece = Piece {
+            start: places[ends[0]],
+            end: places[ends[1]],
+            curve: Curve::Spline { spline: spline.clone(), from },
+            length,
+            axis3: axis3.map_or(Vec3::UNIT[2], |axis| axis.value),
+        };
+        refuse_parallel(beam, &piece, axis3.map_or(span, |axis| &axis.span))?;
+        Ok(piece)
+    };
+    corners.windows(2).map(piece).collect()
+}
+
+/// Refuses a curve along which `axis3` has no part normal to it somewhere: looks closely enough for
+/// any arc.
+fn refuse_parallel(beam: &deck::Beam, piece: &Piece, span: &Span) -> Result<(), Diagnostic> {
+    let axis = piece.axis3;
+    let turns = match &piece.curve {
+        Curve::Line | Curve::Arc { .. } => 1.0,
+        Curve::Helix(helix) => helix.turns(),
+        Curve::Spline { spline, .. } => spline.segments() as f64,
+    };
+    let count = (TANGENTS * turns.max(1.0)).min(MOST_TANGENTS) as usize;
+    let parallel = |k: usize| piece.tangent(k as f64 / count as f64).cross(axis).norm() <= 1e-2 * axis.norm();
+    if !(0..=count).any(parallel) {
+        return Ok(());
+    }
+    let line = match piece.curve {
+        Curve::Line => "line",
+        Curve::Arc { .. } => "arc",
+        Curve::Helix(_) => "helix",
+        Curve::Spline { .. } => "spline",
+    };
+    let error = if beam.axis3.is_some() {
+        Diagnostic::error(
+            format!("`axis3` is parallel to the {line} of beam `{}` at some point", beam.name.value),
+            span.clone(),
+        )
+    } else {
+        let Vec3([x, y, z]) = axis;
+        let message = format!(
+            "the {line} of beam `{}` is parallel to its `axis3` at some point, which is [{x}, {y}, {z}] if left out",
+            beam.name.value
+        );
+        Diagnostic::error(message, span.clone()).help("give `axis3`: a vector that is nowhere along the beam")
+    };
+    Err(error)
+}
+
+fn refuse_infinite(beam: &deck::Beam, length: f64, span: &Span) -> Result<(), Diagnostic> {
+    if length.is_finite() {
+        return Ok(());
+    }
+    let message =
+        format!("a piece of beam `{}` has a length beyond the range of floating-point numbers", beam.name.value);
+    Err(Diagnostic::error(message, span.clone()))
+}
+
+fn refuse_no_length(beam: &deck::Beam, start: Vec3, end: Vec3, span: &Span) -> Result<(), Diagnostic> {
+    let length = (end - start).norm();
+    refuse_infinite(beam, length, span)?;
+    if length > 1e-12 * start.norm().max(end.norm()) {
+        return Ok(());
+    }
+    let message = format!("a piece of beam `{}` has no length: it starts and ends at the same place", beam.name.value);
+    Err(Diagnostic::error(message, span.clone()))
 }
 
 #[cfg(test)]
@@ -336,7 +480,7 @@ mod tests {
     #[test]
     fn axes_are_right_handed_and_twist_about_the_tangent() {
         let quarter = piece([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]]);
-        let line = CentreLine::new(vec![quarter], [0.0, PI / 2.0]);
+        let line = CentreLine::new(vec![quarter], Along::new(&[[0.0], [PI / 2.0]], None));
         let e1 = line.pieces[0].tangent(1.0);
         let plain = line.pieces[0].untwisted_axes(e1);
         let turned = line.axes(0, e1, 1.0);

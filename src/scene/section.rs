@@ -1,11 +1,15 @@
 //! Sections as matrices in their local axes, from resultants, full matrices, or shape and material.
 
+use super::along::Along;
 use super::computed;
 use crate::deck::{
     self, Deck, Diagnostic, EffectWord, Effects, Elastic, Isotropic, SectionBody, Shape, ShearFactor, Span, Spanned,
     StationsWord,
 };
+use beamsim_core::kernel::inertia::Inertia;
+use beamsim_core::model::beam_element::body_inertia;
 use beamsim_core::model::{MassPerLength, SectionMatrices};
+use beamsim_core::section::properties::{moved, turned};
 use beamsim_core::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix6, SymmetricEigen};
 use std::f64::consts::PI;
@@ -34,6 +38,15 @@ pub enum SectionCourse {
         fractions: Vec<f64>,
         /// Between each two
         courses: Vec<SectionCourse>,
+    },
+    /// Another course, whose origin lies beside the line of the beam
+    Placed {
+        /// The sections about their own origins, in their own axes
+        course: Box<SectionCourse>,
+        /// Place of the origin along axes 2 and 3 of the beam
+        offset: Along<2>,
+        /// Angle of the axes of the section about axis 1
+        turn: Along<1>,
     },
     /// Another course, so stiff against these of its strains that they vanish
     Rigid(Box<SectionCourse>, [bool; 6]),
@@ -68,6 +81,7 @@ impl SectionCourse {
                 let to = fractions[next];
                 courses[next - 1].at(((s - from) / (to - from)).clamp(0.0, 1.0))
             }
+            Self::Placed { course, offset, turn } => placed(course.at(s), offset.at(s), turn.at(s)),
             Self::Rigid(course, strains) => {
                 let section = course.at(s);
                 let stiffness = stiffened(&section.stiffness, strains);
@@ -92,6 +106,15 @@ impl SectionCourse {
             return Err(last);
         }
         Ok(Self::Stations { fractions: fractions.iter().map(|s| s / last).collect(), courses })
+    }
+
+    /// The course with its origin at `offset` from the line of the beam, along axes 2 and 3, turned
+    /// about axis 1 by `turn`.
+    pub fn placed(self, offset: Along<2>, turn: Along<1>) -> Self {
+        if offset.is_zero() && turn.is_zero() {
+            return self;
+        }
+        Self::Placed { course: Box::new(self), offset, turn }
     }
 
     /// The course as `[effects]` wants it.
@@ -121,6 +144,22 @@ fn stiffened(stiffness: &[[f64; 6]; 6], strains: &[bool; 6]) -> [[f64; 6]; 6] {
         (true, _) | (_, true) => RIGID * stiffness[i][j],
     };
     std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+}
+
+/// Matrices about a line from which the origin of the section is seen at `offset`, in axes against
+/// which the section is turned by `turn` from axis 2 towards axis 3.
+fn placed(section: SectionMatrices, offset: [f64; 2], [turn]: [f64; 1]) -> SectionMatrices {
+    let own = Matrix6::from_fn(|i, j| section.stiffness[i][j]);
+    let stiffness = moved(&turned(&own, -turn), offset.map(|x| -x));
+    let (sin, cos) = libm::sincos(turn);
+    let axes = Mat3([[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]]);
+    let mass = section.mass.map(|mass| {
+        let turned = mass.turned(axes);
+        let from_line = turned.offset + Vec3([0.0, offset[0], offset[1]]);
+        let Inertia { mass, offset, about_node } = body_inertia(turned.mass, from_line, turned.about_centre());
+        MassPerLength { mass, offset, about_line: about_node }
+    });
+    SectionMatrices { stiffness: std::array::from_fn(|i| std::array::from_fn(|j| stiffness[(i, j)])), mass }
 }
 
 fn mix(a: f64, b: f64, s: f64) -> f64 {

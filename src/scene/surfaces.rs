@@ -2,7 +2,7 @@
 
 use super::constraints::axes;
 use super::names;
-use crate::deck::{self, Deck, Diagnostic, Path, SideWord, Spanned, SurfaceBody};
+use crate::deck::{self, Deck, Diagnostic, SideWord, Spanned, SurfaceBody, TubeLine};
 use beamsim_core::kernel::contact::{Cone, Shape, Side, Surface, Tube, TubeEnds, TubeError};
 use beamsim_core::tensor::Vec3;
 use std::f64::consts::PI;
@@ -54,17 +54,17 @@ fn shape(deck: &Deck, table: &deck::Surface) -> Result<Shape, Diagnostic> {
 fn tube(
     deck: &Deck,
     table: &deck::Surface,
-    line: &Path,
+    line: &TubeLine,
     smooth: bool,
     radii: &Spanned<Vec<f64>>,
 ) -> Result<Shape, Diagnostic> {
     let (points, radii_of_points) = match line {
-        Path::Through(points) => {
+        TubeLine::Through(points) => {
             let places: Vec<Vec3> = points.iter().map(|point| names::place(deck, point)).collect::<Result<_, _>>()?;
             let count = places.len();
             (places, spread(&radii.value, count))
         }
-        Path::Arc([a, b, c]) => {
+        TubeLine::Arc([a, b, c]) => {
             let [a, b, c] = [names::place(deck, a)?, names::place(deck, b)?, names::place(deck, c)?];
             let places = arc(a, b, c).ok_or_else(|| {
                 Diagnostic::error("the three points of `arc` lie on a line: use `through`", table.span.clone())

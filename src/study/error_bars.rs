@@ -197,7 +197,7 @@ pub fn polylines(deck: &Deck) -> Vec<String> {
         if angles.len() >= 2 && (SMALLEST_BEND..LARGEST_BEND).contains(&widest) {
             messages.push(format!(
                 "beam {}: its {} straight pieces meet at angles of up to {:.1}°; if they approximate a curve, the \
-                 estimated errors do not include that approximation (use `arc`, or more points)",
+                 estimated errors do not include that approximation (use `arc`, `helix` or `spline`, or more points)",
                 beam.name.value,
                 ways.len(),
                 widest.to_degrees()

@@ -257,3 +257,43 @@ fn contacts_over_increments() {
         tangent_holds(&(beams("relative", order) + &lie + EXTRAS + SURFACES), true, 71 + order as u64);
     }
 }
+
+#[test]
+fn damping_by_strain() {
+    let by_strain = "stiffness = [0.2, 0.1, 0.3, 0.05, 0.4, 0.15]\n[[joint]]";
+    let extras = EXTRAS.replace("stiffness = 0.2\n[[joint]]", by_strain);
+    assert_ne!(extras, EXTRAS);
+    let lie = SECTION.replace("step = 0.1", "step = 0.1\nscheme = \"lie_generalized_alpha\"");
+    for order in 1..=3 {
+        tangent_holds(&(beams("total", order) + SECTION + &extras), false, 81 + order as u64);
+        tangent_holds(&(beams("relative", order) + SECTION + &extras), false, 91 + order as u64);
+        tangent_holds(&(beams("relative", order) + &lie + &extras), true, 101 + order as u64);
+    }
+}
+
+/// Points with viscosities of their own, in elements of several orders: as good as equal factors damp like one factor.
+#[test]
+fn equal_factors_of_all_strains_are_one_factor() {
+    let deck = |factors: &str| {
+        let beam = |name: &str, ends: &str, order: usize, interpolation: &str| {
+            format!(
+                "[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = [{ends}]\nelements = 2\norder = {order}\n\
+                 interpolation = \"{interpolation}\"\n"
+            )
+        };
+        let all: String = (1..=3)
+            .flat_map(|order| ["total", "relative"].map(|word| (order, word)))
+            .map(|(order, word)| beam(&format!("{word}{order}"), "\"root\", \"knee\", \"tip\"", order, word))
+            .collect();
+        let section = SECTION.replace("fix = \"pin\"", "fix = \"all\"").replace("end = 1", "end = 0.3");
+        format!(
+            "{all}{section}[damping]\nstiffness = {factors}\n[[load]]\nat = \"tip\"\nforce = [1, 2, 3]\n[output]\nnodes = [\"tip\"]\n"
+        )
+    };
+    let one = crate::scenes::simulate(&deck("0.05"));
+    let six = crate::scenes::simulate(&deck("[0.05, 0.05, 0.05, 0.05, 0.05, \"0.05*(1 + 1e-12)\"]"));
+    for column in ["tip.ux", "tip.uy", "tip.uz"] {
+        let [one, six] = [one.end(column), six.end(column)];
+        assert!((one - six).abs() < 1e-8 * one.abs(), "{column}: {one} against {six}");
+    }
+}

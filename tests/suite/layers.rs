@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 /// From the bottom to the top; each imports only what stands before it, and `deck`, the words, only the names of failures and
 /// warnings, and [`DECK_ROWS`].
 #[rustfmt::skip]
-const ORDER: [&str; 21] = [
+const ORDER: [&str; 22] = [
     "failure", "warning", "interrupt", "threads", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "section", "run", "probe",
-    "deck", "scene", "output", "study", "cli",
+    "deck", "scene", "import", "output", "study", "cli",
 ];
 
 /// Kinds that the mechanics describe, each once: `deck` reads words for them, so that a new kind is a new word.

@@ -79,10 +79,13 @@ fn direction(deck: &Deck, a: &PointRef, b: &PointRef) -> Vec3 {
 fn with_axes(mut deck: Deck) -> Option<Deck> {
     let plain = deck.clone();
     for beam in &mut deck.beams {
-        let Path::Through(points) = &beam.path else { continue };
         if beam.axis3.is_some() {
             continue;
         }
+        if let Path::Spline(_) = &beam.path {
+            beam.axis3 = Some(deck::Spanned { value: Vec3::UNIT[2].0, span: beam.span.clone() });
+        }
+        let Path::Through(points) = &beam.path else { continue };
         let along_z = |pair: &[deck::Spanned<PointRef>]| {
             let d = direction(&plain, &pair[0].value, &pair[1].value);
             d.cross(Vec3::UNIT[2]).norm() < 1e-6 * d.norm()
@@ -115,6 +118,16 @@ fn turn(mut deck: Deck, q: Mat3) -> Deck {
         match &mut beam.path {
             Path::Through(points) => points.iter_mut().for_each(|p| turn_place(q, &mut p.value)),
             Path::Arc(points) => points.iter_mut().for_each(|p| turn_place(q, &mut p.value)),
+            Path::Helix(helix) => {
+                turn_place(q, &mut helix.start.value);
+                turn_place(q, &mut helix.centre.value);
+                helix.axis = turned(q, helix.axis);
+            }
+            Path::Spline(spline) => {
+                spline.points.iter_mut().for_each(|p| turn_place(q, &mut p.value));
+                let tangents = spline.tangents.iter_mut().flat_map(|tangents| &mut tangents.value);
+                tangents.for_each(|tangent| *tangent = turned(q, *tangent));
+            }
         }
         beam.axis3.iter_mut().for_each(|axis| axis.value = turned(q, axis.value));
     }

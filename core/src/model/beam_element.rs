@@ -145,7 +145,7 @@ pub fn push_elastic(
     batches: &mut ElasticElements,
     element: &impl ElementGeometry,
     free: Option<usize>,
-    point: impl Fn(&Station) -> SectionPoint,
+    point: impl FnMut(&Station) -> SectionPoint,
 ) {
     match element.count() {
         2 => batches.two.push(elastic(element, free, point, batches.two.last())),
@@ -157,7 +157,7 @@ pub fn push_elastic(
 fn elastic<const N: usize, const G: usize>(
     element: &impl ElementGeometry,
     free: Option<usize>,
-    point: impl Fn(&Station) -> SectionPoint,
+    mut point: impl FnMut(&Station) -> SectionPoint,
     neighbour: Option<&ElasticElement<N, G>>,
 ) -> ElasticElement<N, G> {
     let stations = element.stations(Rule::Inner);

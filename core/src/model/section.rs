@@ -42,6 +42,18 @@ impl SectionMatrices {
         Self { mass: Some(mass), ..self }
     }
 
+    /// The viscosity that damps each strain i by a factor f_i of its own, in global components, for
+    /// section axes R0. A coupling has the geometric mean of two factors, sqrt(f_i f_j), so that the
+    /// viscosity is symmetric and never gives energy.
+    pub fn viscosity_in(&self, r0: Mat3, factors: &[f64; 6]) -> Stiffness {
+        let entry = |i: usize, j: usize| match i == j {
+            true => factors[i] * self.stiffness[i][i],
+            false => (factors[i] * factors[j]).sqrt() * self.stiffness[i][j],
+        };
+        let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
+        Self { stiffness, mass: None }.law_in(r0).stiffness
+    }
+
     /// The law in global components, for section axes R0.
     pub fn law_in(&self, r0: Mat3) -> BeamLaw {
         let block = |row: usize, column: usize| {

@@ -230,7 +230,7 @@ impl Composer<'_> {
     /// Rayleigh damping, each part only where its factor is not zero.
     pub(super) fn damping(&mut self) {
         let names = ["mass-proportional damping of beams", "mass-proportional damping of bodies"];
-        let [mass, _] = self.deck.damping.unwrap_or_default();
+        let mass = self.deck.damping.map_or(0.0, |damping| damping.mass);
         if mass == 0.0 || !self.dynamic {
             let why = if !self.deck.effects.allow(EffectWord::Damping) {
                 SWITCHED_OFF

@@ -11,12 +11,12 @@ use super::constraints::find_history;
 use super::joints::FoundJoint;
 use super::mesh::{BeamElement, Mesh};
 use super::output::needs;
-use crate::deck::{self, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
+use crate::deck::{self, Damping, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
 use beamsim_core::effect::Effect;
-use beamsim_core::effect::elasticity::{ElasticElements, RotationInterpolation, StressField};
+use beamsim_core::effect::elasticity::{ElasticElements, RotationInterpolation, StressField, Viscosity};
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
-use beamsim_core::kernel::law::Strain;
+use beamsim_core::kernel::law::{Stiffness, Strain};
 use beamsim_core::model::beam_element::{SectionPoint, push_elastic};
 use beamsim_core::model::{Amplitude, History, SlotKind, StageSet, Support};
 use beamsim_core::probe::Need;
@@ -221,14 +221,24 @@ impl Composer<'_> {
     fn elasticity_of(&mut self, word: InterpolationWord, interpolation: RotationInterpolation) {
         let free: HashMap<String, usize> = self.free_strains();
         let mut elements = ElasticElements::default();
+        let Damping { stiffness: factors, .. } = self.deck.damping.unwrap_or(Damping::NONE);
+        let damped = factors != [0.0; 6] && self.dynamic;
+        let proportional = factors == [factors[0]; 6];
+        let mut viscosities: [Vec<Stiffness>; 3] = Default::default();
         self.each_element(|element| {
             if element.beam.interpolation != word {
                 return;
             }
             let beam = element.beam;
-            push_elastic(&mut elements, element, free.get(&beam.name).copied(), |station| SectionPoint {
-                law: beam.section.at(station.fraction).law_in(station.axes),
-                free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
+            push_elastic(&mut elements, element, free.get(&beam.name).copied(), |station| {
+                let section = beam.section.at(station.fraction);
+                if damped && !proportional {
+                    viscosities[beam.order - 1].push(section.viscosity_in(station.axes, &factors));
+                }
+                SectionPoint {
+                    law: section.law_in(station.axes),
+                    free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
+                }
             });
         });
         elements.shrink_to_fit();
@@ -239,8 +249,8 @@ impl Composer<'_> {
         }
         let count = elements.two.len() + elements.three.len() + elements.four.len();
         let stressed = self.deck.effects.allow(EffectWord::GeometricStiffness);
-        let [_, factor] = self.deck.damping.unwrap_or_default();
-        let damping = (factor != 0.0 && self.dynamic).then_some(factor);
+        let viscosity = if proportional { Viscosity::Proportional(factors[0]) } else { Viscosity::Points(viscosities) };
+        let damping = damped.then_some(viscosity);
         let beams = interpolation.build(elements, stressed, damping);
         self.reason(name, true, format!("{count} beam elements"));
         self.out.elasticity.push(beams.stresses);

@@ -3,7 +3,7 @@
 use super::order::Expected;
 use super::places::Places;
 use super::variant::{Pace, dynamic_stages};
-use crate::deck::{Deck, Diagnostic, NormWord, Path, StageBody};
+use crate::deck::{Deck, Diagnostic, NormWord, StageBody};
 use crate::scene::Scene;
 use crate::study::outcome::{Outcome, StageClock, columns, columns_of_history};
 use crate::study::scale::{ScaleRow, mesh_error, scales};
@@ -127,7 +127,7 @@ impl Sampler {
             of_history,
             length: scene.plan.model.length,
             ambiguous: ambiguous(scene),
-            curved: deck.beams.iter().any(|beam| matches!(beam.path, Path::Arc(_))),
+            curved: deck.beams.iter().any(|beam| beam.path.is_curved()),
             lumped: scene.reasons.iter().any(|reason| reason.active && LUMPED.contains(&reason.name)),
             rows: ComparedRows::Expected,
         }

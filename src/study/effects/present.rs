@@ -1,6 +1,6 @@
 //! The effects that a scene has.
 
-use crate::deck::{self, Deck, EffectWord, SpringBody};
+use crate::deck::{self, Damping, Deck, EffectWord, SpringBody};
 use crate::scene::Scene;
 
 /// The names of an effect in the reasons of a scene. Dampers have none: they are found in the
@@ -33,7 +33,7 @@ fn is_damped(deck: &Deck) -> bool {
         SpringBody::Ground { damping, .. } => damping != [0.0; 6],
         SpringBody::Between { damping, .. } => damping != 0.0,
     };
-    deck.damping.is_some_and(|factors| factors != [0.0; 2])
+    deck.damping.is_some_and(|damping| damping != Damping::NONE)
         || deck.springs.iter().any(sprung)
         || deck.joints.iter().any(|joint| joint.damping != 0.0)
 }

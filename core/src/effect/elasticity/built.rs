@@ -3,7 +3,7 @@
 
 use super::beam::{BeamElasticity, ElasticElements, StressField};
 use super::interpolation::{Interpolation, RelativeVectors, TotalVectors};
-use super::strain_rate_damping::StrainRateDamping;
+use super::strain_rate_damping::{StrainRateDamping, Viscosity};
 use crate::effect::Effect;
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ pub struct BuiltBeams {
     pub elasticity: Arc<dyn Effect>,
     /// Strains and stresses of the elements, for outputs
     pub stresses: Arc<dyn StressField>,
-    /// Strain-rate damping, if a factor was given
+    /// Strain-rate damping, if one was given
     pub damping: Option<Arc<dyn Effect>>,
 }
 
@@ -45,8 +45,8 @@ impl RotationInterpolation {
     }
 
     /// Builds the effects of elements. `geometric_stiffness`: the tangent includes how stress
-    /// rotates with the beams. `damping`: the factor of the strain-rate damping, a time.
-    pub fn build(self, elements: ElasticElements, geometric_stiffness: bool, damping: Option<f64>) -> BuiltBeams {
+    /// rotates with the beams. `damping`: stress per strain rate.
+    pub fn build(self, elements: ElasticElements, geometric_stiffness: bool, damping: Option<Viscosity>) -> BuiltBeams {
         match self {
             Self::Total => build::<TotalVectors>(elements, geometric_stiffness, damping),
             Self::Relative => build::<RelativeVectors>(elements, geometric_stiffness, damping),
@@ -54,9 +54,14 @@ impl RotationInterpolation {
     }
 }
 
-fn build<I: Interpolation>(elements: ElasticElements, geometric_stiffness: bool, damping: Option<f64>) -> BuiltBeams {
+fn build<I: Interpolation>(
+    elements: ElasticElements,
+    geometric_stiffness: bool,
+    damping: Option<Viscosity>,
+) -> BuiltBeams {
     let stressed = BeamElasticity::<I>::new(elements);
     let elasticity = Arc::new(if geometric_stiffness { stressed } else { stressed.without_geometric_stiffness() });
-    let damper = |factor| Arc::new(StrainRateDamping { elasticity: elasticity.clone(), factor }) as Arc<dyn Effect>;
+    let damper =
+        |viscosity| Arc::new(StrainRateDamping { elasticity: elasticity.clone(), viscosity }) as Arc<dyn Effect>;
     BuiltBeams { elasticity: elasticity.clone(), stresses: elasticity.clone(), damping: damping.map(damper) }
 }

@@ -11,4 +11,4 @@ pub use beam::{BeamElasticity, ElasticElements, StressField};
 pub use built::{BuiltBeams, RotationInterpolation};
 pub use element::{BeamLaw, ElasticElement, ElasticPoint};
 pub use interpolation::{Interpolation, RelativeVectors, TotalVectors};
-pub use strain_rate_damping::StrainRateDamping;
+pub use strain_rate_damping::{StrainRateDamping, Viscosity};

@@ -1,5 +1,6 @@
 //! The stiffness part of Rayleigh damping: material stresses beta C d(Gamma, K)/dt, so that rigid
-//! motions are not damped. C is the stiffness of the section at rest, and beta a time.
+//! motions are not damped. C is the stiffness of the section at rest, and beta a time. In the place
+//! of beta C a point may have a viscosity of its own.
 //!
 //! With b_k = w dE_k/dq for each strain component E_k of a point of weight w, and G_k = db_k/dq:
 //!
@@ -29,8 +30,44 @@ use std::sync::Arc;
 pub struct StrainRateDamping<I> {
     /// The beams
     pub elasticity: Arc<BeamElasticity<I>>,
-    /// beta, a time
-    pub factor: f64,
+    /// Stress per strain rate
+    pub viscosity: Viscosity,
+}
+
+/// The damping stresses of points over their strain rates.
+#[derive(Clone, Debug)]
+pub enum Viscosity {
+    /// beta times the stiffness of the section at rest; beta is a time
+    Proportional(f64),
+    /// Stiffness times time, in global components, for each point of each element: of those with
+    /// two nodes, with three, and with four
+    Points([Vec<Stiffness>; 3]),
+}
+
+impl Viscosity {
+    /// The viscosities of the points of an element, where they are given; `number` counts elements
+    /// with as many nodes.
+    fn points<const G: usize>(&self, number: usize) -> Option<&[Stiffness; G]> {
+        match self {
+            Self::Proportional(_) => None,
+            Self::Points(all) => all[G - 1][G * number..].first_chunk(),
+        }
+    }
+
+    /// What the stiffness of a point is multiplied with.
+    fn factor(&self) -> f64 {
+        match self {
+            Self::Proportional(factor) => *factor,
+            Self::Points(_) => 1.0,
+        }
+    }
+
+    fn each(&self, show: &mut dyn FnMut(&Stiffness)) {
+        match self {
+            Self::Proportional(_) => {}
+            Self::Points(all) => all.iter().flatten().for_each(show),
+        }
+    }
 }
 
 impl<I: Interpolation> Effect for StrainRateDamping<I> {
@@ -50,13 +87,23 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
         TangentForm::General
     }
 
-    fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         // The elasticity shows the data of its beams itself.
+        self.viscosity.each(&mut |stiffness| {
+            show(MirrorData::Tensor(stiffness.cn));
+            show(MirrorData::Tensor(stiffness.cm));
+            if let Some(cc) = stiffness.cc {
+                show(MirrorData::Coupling(cc));
+            }
+        });
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
+        let elements = &self.elasticity.elements;
+        // The number of the first element with as many nodes, by points of an element.
+        let starts = [0, elements.two.len(), elements.two.len() + elements.three.len()];
         for_each_batch!(self.elasticity.elements, out.instances(), |first, batch| {
-            add_batch::<I, _, _>(batch, first, self.factor, at, weights, out);
+            add_batch::<I, _, _>(batch, first, (&self.viscosity, &starts), at, weights, out);
         });
     }
 
@@ -72,7 +119,7 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
 fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
     first: usize,
-    factor: f64,
+    (viscosity, starts): (&Viscosity, &[usize; 3]),
     at: &State,
     weights: Weights,
     out: &mut Assembler,
@@ -83,9 +130,29 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
         let member = element.member();
         member.connection.evaluate(at, weights, true, after_displacement, &mut system, &|nodes, weights, out| {
             let motion = ElementMotion::new(member, nodes, at);
-            motion.add::<I, G>(&element.points(), factor, weights, &mut scratch_memory.borrow_mut(), out);
+            let damping =
+                PointDamping { factor: viscosity.factor(), own: viscosity.points::<G>(first + k - starts[G - 1]) };
+            motion.add::<I, G>(&element.points(), damping, weights, &mut scratch_memory.borrow_mut(), out);
         });
         out.add(first + k, &system);
+    }
+}
+
+/// Damping stresses of the points of an element over their strain rates.
+#[derive(Clone, Copy)]
+struct PointDamping<'a, const G: usize> {
+    /// Factor of the stiffness: beta, or 1 for viscosities of their own
+    factor: f64,
+    own: Option<&'a [Stiffness; G]>,
+}
+
+impl<const G: usize> PointDamping<'_, G> {
+    /// What is multiplied with the factor and a strain rate.
+    fn stiffness<const N: usize>(&self, points: &[ElasticPoint<N>; G], g: usize) -> Stiffness {
+        match self.own {
+            Some(own) => own[g],
+            None => points[g].law.stiffness_at_rest(),
+        }
     }
 }
 
@@ -132,43 +199,45 @@ impl<const N: usize> ElementMotion<N> {
         }
     }
 
-    /// Adds force and tangent of all points; `factor` is beta.
+    /// Adds force and tangent of all points.
     fn add<I: Interpolation, const G: usize>(
         &self,
         points: &[ElasticPoint<N>; G],
-        factor: f64,
+        damping: PointDamping<G>,
         weights: Weights,
         scratch_memory: &mut DampingScratch,
         out: &mut ElementSystem,
     ) {
         let view = I::View::<N, f64>::new(&self.configuration);
-        let sum = Stressed { points, stresses: &self.stresses(&view, points, factor) };
+        let sum = Stressed { points, stresses: &self.stresses(&view, points, damping) };
         let Workspace { system, scratch } = &mut scratch_memory.element;
         view.fill(&sum, weights.stiffness, scratch, system);
         out.add_system(system, weights.stiffness != 0.0);
         if weights.stiffness != 0.0 || weights.damping != 0.0 {
             let moving = I::View::<N, Jet>::new(&self.jets());
-            for point in points {
+            for (g, point) in points.iter().enumerate() {
                 let strains = Strains::new(self, &moving, &point.lifted(), &mut scratch_memory.jets);
-                strains.add_tangent(&point.law.stiffness_at_rest(), factor / point.weight, weights, out);
+                let factor = damping.factor / point.weight;
+                strains.add_tangent(&damping.stiffness(points, g), factor, weights, out);
             }
         }
     }
 
-    /// The stress s at each point; `factor` is beta.
+    /// The stress s at each point.
     fn stresses<const G: usize>(
         &self,
         view: &impl View<N, f64>,
         points: &[ElasticPoint<N>; G],
-        factor: f64,
+        damping: PointDamping<G>,
     ) -> [Stress; G] {
+        let factor = damping.factor;
         let nodes = view.nodes();
         let rates = view.variation(&self.displacements, &self.rotations.map(|of| of.rate));
         std::array::from_fn(|g| {
             let place = points[g].configuration(nodes);
             let rate = points[g].strain_variation(&place, |i| rates[i].0, |i| rates[i].1);
             let scaled = Strain { gamma: rate.gamma * factor, kappa: rate.kappa * factor };
-            points[g].law.stiffness_at_rest().stress(&scaled)
+            damping.stiffness(points, g).stress(&scaled)
         })
     }
 }
@@ -260,7 +329,7 @@ impl Strains {
         Self { blocks }
     }
 
-    /// Adds the part of the tangent by the change of s; `factor` is beta / w.
+    /// Adds the part of the tangent by the change of s; `factor` is beta / w, or 1 / w.
     fn add_tangent(&self, stiffness: &Stiffness, factor: f64, weights: Weights, out: &mut ElementSystem) {
         for column in 0..out.blocks() {
             // Each strain is a row.

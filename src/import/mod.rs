@@ -1,0 +1,16 @@
+//! Decks from files of other programs.
+
+mod abaqus;
+mod abaqus_deck;
+mod beamdyn;
+mod beamdyn_deck;
+mod deck_text;
+mod keywords;
+mod lines;
+
+pub use abaqus::{Model, read_abaqus};
+pub use abaqus_deck::abaqus_deck;
+pub use beamdyn::{Blade, Driver, read_blade, read_driver};
+pub use beamdyn_deck::beamdyn_deck;
+pub use deck_text::Imported;
+pub use lines::ImportError;

@@ -1,0 +1,260 @@
+//! Decks from files of other programs: blades of BeamDyn.
+
+use super::folder::{Folder, last_line, status};
+use crate::failures::frequencies;
+use crate::scenes::simulate;
+use beamsim::import::{abaqus_deck, beamdyn_deck, read_abaqus, read_blade, read_driver};
+use std::fs;
+
+fn text(name: &str) -> String {
+    fs::read_to_string(format!("tests/import/{name}")).unwrap()
+}
+
+/// The deck of the NREL 5-MW blade (NREL/TP-500-38060, table 2-1), with its driver or without.
+fn nrel(primary: &str, blade: &str, driver: Option<&str>) -> Result<String, String> {
+    let driver = driver.map(|text| read_driver("d.dat", text)).transpose().map_err(|error| error.to_string())?;
+    let open = |_: &str| Ok(("b.dat".to_string(), blade.to_string()));
+    let blade = read_blade("p.dat", primary, open).map_err(|error| error.to_string())?;
+    Ok(beamdyn_deck(&blade, driver.as_ref()).deck)
+}
+
+/// The modes of the blade alone, as published: the turbine has collective flap 0.6993 Hz and
+/// asymmetric edge 1.0793 and 1.0898 Hz, second asymmetric flap 1.9337 to 2.0205 Hz (table 9-1, FAST), in which hub and tower
+/// take part a little.
+#[test]
+fn the_nrel_5mw_blade_has_its_published_frequencies() {
+    let deck = nrel(&text("nrel_5mw.dat"), &text("nrel_5mw_blade.dat"), None).unwrap();
+    let found: Vec<f64> = frequencies(&deck).iter().map(|omega| omega / (2.0 * std::f64::consts::PI)).collect();
+    for (found, published) in found.iter().zip([0.6993, 1.0845, 1.977]) {
+        assert!((found / published - 1.0).abs() < 0.025, "{found} Hz against {published} Hz; all: {found:?}");
+    }
+}
+
+/// A force along x, small enough for the linear theory. The expected values are unit-load integrals over the tables, with the twist
+/// about -z linear between stations (a program of its own, 8 Gauss points between two stations).
+#[test]
+fn the_nrel_5mw_blade_deflects_by_the_unit_load_integral() {
+    let driver = text("nrel_5mw_driver.dat");
+    let deck = nrel(&text("nrel_5mw.dat"), &text("nrel_5mw_blade.dat"), Some(&driver)).unwrap();
+    let run = simulate(&deck);
+    let [x, y] = ["blade@end.ux", "blade@end.uy"].map(|column| run.end(column));
+    assert!((x / 0.08156319489 - 1.0).abs() < 2e-3, "{x}");
+    assert!((y / -0.00475603542 - 1.0).abs() < 5e-3, "{y}");
+}
+
+#[test]
+fn damping_and_matrices_are_in_the_order_of_sections() {
+    let blade = text("nrel_5mw_blade.dat");
+    let deck = nrel(&text("nrel_5mw.dat"), &blade, None).unwrap();
+    assert!(deck.contains("stiffness = [0.0012, 0.001, 0.0011, 0.0016, 0.0014, 0.0022]"), "{deck}");
+    // EA first, then shear along x and y, torsion, bending about x and y.
+    assert!(
+        deck.contains("# at 0.0: b.dat, line 11\nstiffness = [\n  [9729480000.0, 0.0, 0.0, 0.0, 0.0, 0.0],"),
+        "{deck}"
+    );
+    let first = deck.split("[section.station_02]").next().unwrap();
+    let torsion = first.find("5564400000.0").unwrap();
+    assert!(torsion < first.find("18113600000.0").unwrap(), "{first}");
+    assert!(first.find("18113600000.0").unwrap() < first.find("18110000000.0").unwrap(), "{first}");
+}
+
+/// A blade that bends and sweeps is a spline; point loads find nodes.
+#[test]
+fn curved_blades_are_splines() {
+    let primary = text("nrel_5mw.dat");
+    let mut curved = String::new();
+    for line in primary.lines() {
+        let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        match numbers[..] {
+            [0.0, 0.0, z, twist] if line.contains('E') => {
+                let s = z / 61.5;
+                curved += &format!("{} {} {z} {twist}\n", -4.0 * s * s, 0.8 * s * s * s);
+            }
+            _ => curved += &format!("{line}\n"),
+        }
+    }
+    let driver = text("nrel_5mw_driver.dat")
+        .replace("0   NumPointLoads", "1   NumPointLoads")
+        .replace("(N-m)        (N-m)        (N-m)\n", "(N-m)        (N-m)        (N-m)\n0.7 0 500 0 0 0 0\n");
+    let deck = nrel(&curved, &text("nrel_5mw_blade.dat"), Some(&driver)).unwrap();
+    assert!(deck.contains("spline = [") && deck.contains("at = \"blade@0.7\""), "{deck}");
+    let run = simulate(&deck);
+    assert!((run.end("blade@end.ux") / 0.0816 - 1.0).abs() < 0.05, "{}", run.end("blade@end.ux"));
+}
+
+#[test]
+fn wrong_files_are_refused_at_their_place() {
+    let primary = text("nrel_5mw.dat");
+    let blade = text("nrel_5mw_blade.dat");
+    let driver = text("nrel_5mw_driver.dat");
+    let cases = [
+        (nrel(&blade, &blade, None), "p.dat: this is a blade file: give the primary file"),
+        (nrel("nothing", &blade, None), "p.dat: this is no primary input file of BeamDyn"),
+        (nrel(&primary, &blade, Some("nothing")), "d.dat: this is no driver input file of BeamDyn"),
+        (
+            nrel(&primary.replace("23   kp_total", "24   kp_total"), &blade, None),
+            "the members have 23 key points in all",
+        ),
+        (nrel(&primary.replace("1.3181000E+01", "13.18l"), &blade, None), "p.dat:26:46: `13.18l` is not a number"),
+        (nrel(&primary, &blade.replace("9.729480E+09", "NaN"), None), "b.dat:14:"),
+        (
+            nrel(&primary, &blade.replace("  1.000000\n", "  0.999\n"), None),
+            "the place of a station must be 1 at the last station, found 0.999",
+        ),
+        (
+            nrel(&primary, &blade.replace("1.1E-03", "-1.1E-03"), None),
+            "b.dat:9:1: a damping coefficient is negative: -0.0011",
+        ),
+        (
+            nrel(&primary, &blade.replace("1.811360E+10", "-1.811360E+10"), None),
+            "the stiffness of station 1 is not positive definite",
+        ),
+        (nrel(&primary, &blade, Some(&driver.replacen("1.0000000E+00  0.0000000E+00", "0.5  0.5", 1))), "GlbDCM"),
+    ];
+    for (found, told) in cases {
+        let message = found.expect_err(told);
+        assert!(
+            message.contains(told),
+            "{message}
+expected {told}"
+        );
+    }
+}
+
+/// Files that end anywhere, or have lost any line, are refused or read, without a panic.
+#[test]
+fn damaged_files_never_panic() {
+    let files = [text("nrel_5mw.dat"), text("nrel_5mw_blade.dat"), text("nrel_5mw_driver.dat")];
+    for which in 0..3 {
+        let lines: Vec<&str> = files[which].lines().collect();
+        for line in (0..lines.len()).step_by(if which == 1 { 7 } else { 1 }) {
+            let cut = lines[..line].join("\n");
+            let without = [&lines[..line], &lines[line + 1..]].concat().join("\n");
+            let garbage = [&lines[..line], &["\u{fffd} \" ,1e999"], &lines[line + 1..]].concat().join("\n");
+            for damaged in [cut, without, garbage] {
+                let mut now = files.clone();
+                now[which] = damaged;
+                let _ = nrel(&now[0], &now[1], Some(&now[2]));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_command_writes_a_deck_that_checks() {
+    let folder = Folder::new("import");
+    for name in ["nrel_5mw.dat", "nrel_5mw_blade.dat", "nrel_5mw_driver.dat"] {
+        folder.write(name, &text(name));
+    }
+    let output = folder.beamsim(&["import", "beamdyn", "nrel_5mw.dat", "nrel_5mw_driver.dat"]);
+    assert_eq!(status(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+    let output = folder.beamsim(&["check", "nrel_5mw.toml"]);
+    assert_eq!(status(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+    let again = folder.beamsim(&["import", "beamdyn", "nrel_5mw.dat"]);
+    assert_eq!(status(&again), 4);
+    assert!(last_line(&again).contains("already exists"), "{}", last_line(&again));
+    let gone = folder.beamsim(&["import", "beamdyn", "missing.dat"]);
+    assert_eq!(status(&gone), 4);
+    folder.write("alone.dat", &text("nrel_5mw.dat").replace("nrel_5mw_blade.dat", "elsewhere.dat"));
+    let alone = folder.beamsim(&["import", "beamdyn", "alone.dat"]);
+    assert_eq!(status(&alone), 2);
+    assert!(
+        last_line(&alone).contains("alone.dat:") && last_line(&alone).contains("elsewhere.dat"),
+        "{}",
+        last_line(&alone)
+    );
+}
+
+/// A cantilever of CalculiX, whose n1 is -z by default: its width lies along z, and its height along y.
+const CANTILEVER: &str = "*NODE
+1, 0, 0, 0
+2, 0.5
+3, 1.0
+4, 1.5
+5, 2.0
+*ELEMENT, TYPE=B32, ELSET=ARM
+1, 1, 2, 3
+2, 3, 4, 5
+*MATERIAL, NAME=Steel-1
+*ELASTIC
+1000., 0.25
+*BEAM SECTION, ELSET=ARM, MATERIAL=STEEL-1, SECTION=RECT
+0.1, 0.2
+*BOUNDARY
+1, 1, 6
+*STEP
+*STATIC
+*CLOAD
+5, 3, 1E-6
+*END STEP
+";
+
+fn abaqus(text: &str) -> Result<String, String> {
+    let model = read_abaqus("a.inp", text).map_err(|error| error.to_string())?;
+    abaqus_deck(&model).map(|imported| imported.deck).map_err(|error| error.to_string())
+}
+
+/// F L³/(3 E I) + F L/(k G A) with Cowper's k.
+#[test]
+fn a_cantilever_of_calculix_deflects_by_its_formula() {
+    let deck = abaqus(CANTILEVER).unwrap();
+    let run = simulate(&format!("{deck}[output]\nnodes = [\"n5\"]\ncolumns = [\"u\"]\n"));
+    let bending = 1e-6 * 8.0 / (3.0 * 1000.0 * 0.2 * 0.001 / 12.0);
+    let shear = 1e-6 * 2.0 / (12.5 / 14.75 * 400.0 * 0.02);
+    assert!((run.end("n5.uz") / (bending + shear) - 1.0).abs() < 1e-9, "{}", run.end("n5.uz"));
+}
+
+#[test]
+fn rounds_have_a_radius_or_two_widths() {
+    let of = |dimensions: &str| abaqus(&CANTILEVER.replace("RECT\n0.1, 0.2", &format!("CIRC\n{dimensions}"))).unwrap();
+    assert!(of("0.1").contains("shape = \"circle\"\nradius = 0.1\n"));
+    assert!(of("0.1, 0.1").contains("shape = \"circle\"\nradius = 0.05\n"));
+    assert!(of("0.1, 0.2").contains("shape = \"ellipse\"\nwidth = 0.1\nheight = 0.2\n"));
+}
+
+#[test]
+fn a_frame_of_abaqus_is_three_beams() {
+    let deck = abaqus(&text("frame.inp")).unwrap();
+    assert_eq!(deck.matches("[[beam]]").count(), 3, "{deck}");
+    assert!(deck.contains("through = [\"n3\", \"n8\", \"n4\", \"n9\", \"n5\"]\nelements = 1\norder = 2"), "{deck}");
+    assert!(deck.contains("along = \"girder\"\nforce = [0.0, 0.0, -5000.0]"), "{deck}");
+    let run = simulate(&format!("{deck}[output]\nnodes = [\"n3\", \"n5\"]\ncolumns = [\"u\"]\n"));
+    assert!(run.end("n3.ux") > 1e-3 && run.end("n3.uz") < 0.0);
+    let modes = text("frame.inp").replace("*STATIC", "*FREQUENCY\n4,");
+    assert_eq!(frequencies(&abaqus(&modes).unwrap()).len(), 4);
+}
+
+#[test]
+fn wrong_input_files_are_refused_at_their_place() {
+    let changed = |from: &str, to: &str| {
+        assert!(CANTILEVER.contains(from), "{from}");
+        abaqus(&CANTILEVER.replace(from, to))
+    };
+    let cases = [
+        (abaqus("1, 2, 3\n"), "a.inp:1:1: data without a keyword"),
+        (abaqus("*NODE\n1, 0, 0\n"), "a.inp: there are no beam elements"),
+        (changed("2, 3, 4, 5", "2, 3, 4, 55"), "a.inp:9:10: there is no node 55"),
+        (changed("2, 3, 4, 5", "2, 3, 4"), "a.inp:9:1: an element of type B32 has a number and 3 nodes"),
+        (changed("3, 1.0", "3, 1.o"), "a.inp:4:4: `1.o` is not a number"),
+        (changed("SECTION=RECT", "SECTION=ARBITRARY"), "a.inp:13:1: SECTION=ARBITRARY is not imported"),
+        (changed("0.1, 0.2", "0.1"), "a.inp:14:1: too few dimensions"),
+        (changed("0.1, 0.2", "0.1, 0.2\n1., 0., 0."), "is parallel to the element at node 1"),
+        (changed("MATERIAL=STEEL-1", "MATERIAL=WOOD"), "a.inp:13:1: there is no *MATERIAL WOOD"),
+        (changed("ELSET=ARM, MATERIAL", "ELSET=LEG, MATERIAL"), "there is no set of elements LEG"),
+        (changed("1, 1, 6", "1, 1, 7"), "a.inp:16:7: expected a direction from 1 to 6, found `7`"),
+        (changed("5, 3, 1E-6", "TIP, 3, 1E-6"), "a.inp:20:1: there is no set `TIP` above this line"),
+        (changed("*ELASTIC\n1000., 0.25\n", ""), "the material STEEL-1 has no *ELASTIC"),
+        (changed("4, 1.5", "4, 1.0"), "this element has no length"),
+    ];
+    for (found, told) in cases {
+        let message = found.expect_err(told);
+        assert!(message.contains(told), "{message}\nexpected {told}");
+    }
+    let lines: Vec<&str> = CANTILEVER.lines().collect();
+    for line in 0..lines.len() {
+        let _ = abaqus(&lines[..line].join("\n"));
+        let _ = abaqus(&[&lines[..line], &lines[line + 1..]].concat().join("\n"));
+        let _ = abaqus(&[&lines[..line], &[", =,*,\u{fffd}"], &lines[line + 1..]].concat().join("\n"));
+        let _ = abaqus(&[&lines[..line], &["*"], &lines[line..]].concat().join("\n"));
+    }
+}
