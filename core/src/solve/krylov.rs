@@ -4,7 +4,7 @@
 //! orthonormal in an inner product x . W y in which the operator is symmetric, if there is one.
 
 use crate::interrupt;
-use crate::scalar::{LANES, Lanes};
+use crate::scalar::{Instructions, LANES, Lanes};
 use crate::threads;
 use faer::linalg::solvers::{Eigen, SelfAdjointEigen};
 use faer::{Mat, Side};
@@ -14,8 +14,8 @@ use nalgebra::Complex;
 pub trait Operator {
     /// Length of its vectors
     fn size(&self) -> usize;
-    /// Image of a vector; `None` if the computation fails or is interrupted.
-    fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>>;
+    /// Image of a vector x, given with W x; `None` if the computation fails or is interrupted.
+    fn apply(&mut self, x: &[f64], weighed: &[f64]) -> Option<Vec<f64>>;
     /// W x, with the possibly semidefinite W of the inner product.
     fn weigh(&mut self, x: &[f64]) -> Vec<f64>;
     /// True if the operator is symmetric in the inner product
@@ -30,21 +30,25 @@ pub struct Spectrum {
     /// Coordinates of each eigenvector in the basis
     coordinates: Vec<Vec<Complex<f64>>>,
     space: KrylovSpace,
-    /// True if one eigenvalue was enough: the others may not have converged
-    pub(crate) was_enough: bool,
 }
 
 /// Size of the basis of a rough estimate of eigenvalues
 const ROUGH_BASIS_SIZE: usize = 12;
 /// Number of vectors in a block
 const BLOCK_SIZE: usize = 6;
+/// Number of vectors in a block where multiple eigenvalues need not be counted: two tell apart a
+/// conjugate pair that is nearly real
+const SMALL_BLOCK_SIZE: usize = 2;
+/// Number of basis vectors that are multiplied with another one at a time, which is then read once
+const GROUP_SIZE: usize = 4;
 /// Size of a projection above which its eigenvalues may take long, and have a thread of their own so
 /// that a request to stop need not wait for them
 const LONG_PROJECTION: usize = 100;
 /// Relative change of eigenvalues between two projections at which they have converged
 const EIGENVALUE_TOLERANCE: f64 = 1e-11;
-/// Relative change between two projections of an eigenvalue that is enough
-const ENOUGH_TOLERANCE: f64 = 1e-8;
+/// Relative residual of an eigenvector at which it has converged where its eigenvalue only tells
+/// the sign of a growth
+const RESIDUAL_TOLERANCE: f64 = 1e-9;
 /// Vectors that orthogonalisation reduces to this part of their norm are linearly dependent on the
 /// basis.
 const DEPENDENT_NORM_RATIO: f64 = 1e-11;
@@ -52,125 +56,121 @@ const DEPENDENT_NORM_RATIO: f64 = 1e-11;
 /// The `wanted` eigenvalues of largest magnitude, descending; fewer if the space has fewer
 /// dimensions. `None` if an image cannot be computed, or after a request to stop.
 pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Spectrum> {
-    largest_eigenvalues_until(operator, wanted, &|_| false)
-}
-
-/// Like [`largest_eigenvalues`], but the search ends as soon as an eigenvalue has converged for
-/// which `is_enough`; the others may not have converged then.
-pub fn largest_eigenvalues_until(
-    operator: &mut dyn Operator,
-    wanted: usize,
-    is_enough: &dyn Fn(Complex<f64>) -> bool,
-) -> Option<Spectrum> {
-    let most = operator.size().min(24 * wanted + 160);
-    eigenvalues_within(operator, wanted, most, is_enough)
+    let most = most_vectors(operator, wanted);
+    eigenvalues_within(operator, wanted, most)
 }
 
 /// Rough estimates of the eigenvalues of largest magnitude from a few images. `None` if an image
 /// cannot be computed, or after a request to stop.
 pub fn roughly_largest_eigenvalues(operator: &mut dyn Operator) -> Option<Vec<Complex<f64>>> {
     let most = operator.size().min(ROUGH_BASIS_SIZE);
-    eigenvalues_within(operator, most, most, &|_| false).map(|spectrum| spectrum.values)
+    eigenvalues_within(operator, most, most).map(|spectrum| spectrum.values)
 }
 
-/// Eigenvalues from a basis of at most `most` vectors, see [`largest_eigenvalues_until`]. `None` if
-/// an image cannot be computed, or after a request to stop.
-fn eigenvalues_within(
+/// The `wanted` eigenvalues of largest magnitude that have converged, descending; of multiple ones
+/// there is at least one. The search ends as soon as one has converged for which `is_enough`, and
+/// others may be missing then. `None` if an image cannot be computed, or after a request to stop.
+pub fn distinct_eigenvalues_until(
     operator: &mut dyn Operator,
     wanted: usize,
-    most: usize,
     is_enough: &dyn Fn(Complex<f64>) -> bool,
 ) -> Option<Spectrum> {
-    let size = operator.size();
-    if size == 0 {
-        return Some(Spectrum::default());
+    let most = most_vectors(operator, wanted);
+    let mut space = KrylovSpace::starting(operator, SMALL_BLOCK_SIZE)?;
+    let mut looks = Looks { wanted, ..Looks::default() };
+    loop {
+        let grows = space.grow(operator)? && space.applied() < most;
+        if grows && space.applied() < looks.next {
+            continue;
+        }
+        let pairs = space.pairs(operator.is_symmetric(), wanted)?;
+        let count = pairs.len();
+        let converged: Vec<Eigenpair> =
+            pairs.into_iter().filter(|(value, x)| space.residual(*value, x) <= RESIDUAL_TOLERANCE).collect();
+        let is_complete = count == wanted && converged.len() == count;
+        if !grows || is_complete || converged.iter().any(|(value, _)| is_enough(*value)) {
+            return Some(Spectrum::of(converged, space));
+        }
+        looks.plan(space.applied(), converged.len());
     }
-    let mut space = KrylovSpace::default();
-    let mut block: Vec<Vec<f64>> = Vec::new();
-    for k in 0..BLOCK_SIZE.min(size) {
-        block.push(operator.apply(&start(size, k))?);
+}
+
+/// Sizes of a basis at which eigenvectors are computed: few, since that is expensive.
+#[derive(Default)]
+struct Looks {
+    /// Number of eigenvectors that must converge
+    wanted: usize,
+    /// Size of the basis at the next look
+    next: usize,
+    /// Size of the basis, and number of eigenvectors that had converged, at the last look
+    last: [usize; 2],
+}
+
+impl Looks {
+    /// The next look is where all will have converged if their number grows on as it has since the
+    /// last look, but within an eighth and a half more vectors.
+    fn plan(&mut self, size: usize, converged: usize) {
+        let [last_size, last_converged] = self.last;
+        let came = converged.saturating_sub(last_converged).max(1);
+        let more = self.wanted.saturating_sub(converged) * (size - last_size) / came;
+        self.next = size + more.clamp(size / 8, size / 2);
+        self.last = [size, converged];
     }
+}
+
+/// Largest size of a basis.
+fn most_vectors(operator: &dyn Operator, wanted: usize) -> usize {
+    operator.size().min(24 * wanted + 160)
+}
+
+/// Eigenvalues from a basis of at most `most` vectors, see [`largest_eigenvalues`].
+fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -> Option<Spectrum> {
+    let mut space = KrylovSpace::starting(operator, BLOCK_SIZE)?;
+    // A few more eigenvalues than wanted must converge, lest the second of a pair is missed.
+    let guard = wanted + BLOCK_SIZE;
     let mut last: Vec<Complex<f64>> = Vec::new();
     // Eigenvalues of the projection are computed whenever the basis has grown by a quarter.
     let mut look = 0;
     loop {
-        let first = space.basis.len();
-        for vector in block.drain(..) {
-            space.add(operator, vector, most);
-            if interrupt::is_requested() {
-                return None;
-            }
-        }
-        if space.basis.is_empty() {
-            return Some(Spectrum::default());
-        }
-        if space.basis.len() == first {
-            return space.into_spectrum(operator.is_symmetric(), wanted);
-        }
-        for k in first..space.basis.len() {
-            if interrupt::is_requested() {
-                return None;
-            }
-            let image = operator.apply(&space.basis[k])?;
-            space.images.push(image.clone());
-            block.push(image);
-        }
-        space.project(first);
-        if interrupt::is_requested() {
-            return None;
-        }
-        if space.basis.len() < look && space.basis.len() < most {
+        let grows = space.grow(operator)? && space.applied() < most;
+        if grows && space.applied() < look {
             continue;
         }
-        look = space.basis.len() + space.basis.len() / 4;
-        // A few more eigenvalues than wanted must converge, lest the second of a pair is missed.
-        let guard = wanted + BLOCK_SIZE;
+        look = space.applied() + space.applied() / 4;
         let now = space.eigenvalues(operator.is_symmetric(), guard)?;
         let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= EIGENVALUE_TOLERANCE * a.norm();
-        let still =
-            now.len() == last.len() && now.len() >= wanted.min(size) && now.iter().zip(&last).take(guard).all(same);
-        let near = |a: &Complex<f64>, b: &Complex<f64>| (a - b).norm() <= ENOUGH_TOLERANCE * a.norm();
-        let suffices = now.iter().zip(&last).any(|(a, b)| near(a, b) && is_enough(*a));
-        if still || suffices || space.basis.len() >= most {
-            let was_enough = suffices && !still;
-            let spectrum = space.into_spectrum(operator.is_symmetric(), wanted)?;
-            return Some(Spectrum { was_enough, ..spectrum });
+        let still = now.len() == last.len()
+            && now.len() >= wanted.min(operator.size())
+            && now.iter().zip(&last).take(guard).all(same);
+        if still || !grows {
+            let pairs = space.pairs(operator.is_symmetric(), wanted)?;
+            return Some(Spectrum::of(pairs, space));
         }
         last = now;
     }
 }
 
 impl Spectrum {
+    fn of(pairs: Vec<Eigenpair>, space: KrylovSpace) -> Self {
+        let (values, coordinates) = pairs.into_iter().unzip();
+        Self { values, coordinates, space }
+    }
+
     /// Real and imaginary part of an eigenvector.
     pub fn vector(&self, number: usize) -> [Vec<f64>; 2] {
-        self.combine(number, &self.space.basis)
-    }
-
-    /// Relative residual of an eigenvector, |A x - theta x| over |theta x|, in the norm of the
-    /// inner product.
-    pub fn residual(&self, operator: &mut dyn Operator, number: usize) -> f64 {
-        let theta = self.values[number];
-        let [re, im] = self.vector(number);
-        let [mut left_re, mut left_im] = self.combine(number, &self.space.images);
-        for k in 0..re.len() {
-            left_re[k] -= theta.re * re[k] - theta.im * im[k];
-            left_im[k] -= theta.re * im[k] + theta.im * re[k];
-        }
-        let mut squared = |x: &[f64]| dot(x, &operator.weigh(x)).max(0.0);
-        let left = squared(&left_re) + squared(&left_im);
-        let all = squared(&re) + squared(&im);
-        (left / all).sqrt() / theta.norm()
-    }
-
-    fn combine(&self, number: usize, vectors: &[Vec<f64>]) -> [Vec<f64>; 2] {
-        let length = vectors.first().map_or(0, Vec::len);
+        let length = self.space.basis.first().map_or(0, Vec::len);
         let mut out = [vec![0.0; length], vec![0.0; length]];
-        for (coordinate, vector) in self.coordinates[number].iter().zip(vectors) {
+        for (coordinate, vector) in self.coordinates[number].iter().zip(&self.space.basis) {
             for (out, part) in out.iter_mut().zip([coordinate.re, coordinate.im]).filter(|(_, part)| *part != 0.0) {
                 out.iter_mut().zip(vector).for_each(|(out, v)| *out += part * v);
             }
         }
         out
+    }
+
+    /// Relative residual of an eigenvector, see [`KrylovSpace::residual`].
+    pub fn residual(&self, number: usize) -> f64 {
+        self.space.residual(self.values[number], &self.coordinates[number])
     }
 }
 
@@ -187,115 +187,200 @@ fn start(size: usize, number: usize) -> Vec<f64> {
     (0..size).map(|_| next()).collect()
 }
 
+/// An orthonormal basis, and the images of its first vectors.
 #[derive(Default)]
 struct KrylovSpace {
     basis: Vec<Vec<f64>>,
     /// W times the basis
     weighed: Vec<Vec<f64>>,
-    /// The operator applied to the basis
+    /// Coordinates in the basis of the operator applied to each of its first vectors
     images: Vec<Vec<f64>>,
-    /// Projected operator by rows: basis . W images
-    projected: Vec<Vec<f64>>,
 }
 
 /// Inner product in vector lanes, whose sums are independent.
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a, a_rest) = a.as_chunks::<LANES>();
-    let (b, b_rest) = b.as_chunks::<LANES>();
-    let sums = a.iter().zip(b).fold(Lanes([0.0; LANES]), |sums, (x, y)| sums + Lanes(*x) * Lanes(*y));
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
-    sums.0.iter().sum::<f64>() + rest
+    let [product] = products_of([a], b);
+    product
+}
+
+/// Inner products of some vectors with x.
+#[inline(always)]
+fn products(vectors: &[Vec<f64>], x: &[f64]) -> Vec<f64> {
+    let (groups, rest) = vectors.as_chunks::<GROUP_SIZE>();
+    let of_groups = groups.iter().flat_map(
+        #[inline(always)]
+        |group| products_of(group.each_ref().map(Vec::as_slice), x),
+    );
+    let of_rest = rest.iter().map(
+        #[inline(always)]
+        |vector| dot(vector, x),
+    );
+    of_groups.chain(of_rest).collect()
+}
+
+/// Inner products of a few vectors with x, each in lanes.
+#[inline(always)]
+fn products_of<const N: usize>(vectors: [&[f64]; N], x: &[f64]) -> [f64; N] {
+    let (lanes, rest) = x.as_chunks::<LANES>();
+    let parts = vectors.map(|vector| &vector.as_chunks::<LANES>().0[..lanes.len()]);
+    let mut sums = [Lanes([0.0; LANES]); N];
+    for (k, x) in lanes.iter().enumerate() {
+        for (sum, part) in sums.iter_mut().zip(&parts) {
+            *sum = *sum + Lanes(part[k]) * Lanes(*x);
+        }
+    }
+    let start = x.len() - rest.len();
+    std::array::from_fn(|n| {
+        let of_rest: f64 = vectors[n][start..].iter().zip(rest).map(|(a, b)| a * b).sum();
+        sums[n].0.iter().sum::<f64>() + of_rest
+    })
+}
+
+/// Subtracts from x some vectors times their coordinates.
+#[inline(always)]
+fn subtract(vectors: &[Vec<f64>], coordinates: &[f64], x: &mut [f64]) {
+    let (groups, rest) = vectors.as_chunks::<GROUP_SIZE>();
+    let (of_groups, of_rest) = coordinates.as_chunks::<GROUP_SIZE>();
+    for (group, coordinates) in groups.iter().zip(of_groups) {
+        let [a, b, c, d] = group;
+        let [of_a, of_b, of_c, of_d] = coordinates;
+        for ((((x, a), b), c), d) in x.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+            *x = *x - of_a * a - of_b * b - of_c * c - of_d * d;
+        }
+    }
+    for (vector, coordinate) in rest.iter().zip(of_rest) {
+        for (x, a) in x.iter_mut().zip(vector) {
+            *x -= coordinate * a;
+        }
+    }
 }
 
 impl KrylovSpace {
-    /// Orthogonalises a vector against the basis and adds it, normalised, unless it is linearly
-    /// dependent.
-    fn add(&mut self, operator: &mut dyn Operator, mut vector: Vec<f64>, most: usize) {
-        if self.basis.len() >= most {
-            return;
+    /// Space of the images of a few pseudo-random vectors.
+    fn starting(operator: &mut dyn Operator, block: usize) -> Option<Self> {
+        let mut space = Self::default();
+        let size = operator.size();
+        for number in 0..block.min(size) {
+            let vector = start(size, number);
+            let weighed = operator.weigh(&vector);
+            let image = operator.apply(&vector, &weighed)?;
+            space.add(operator, image);
         }
-        // The squared part of the vector along the basis
-        let mut squared = 0.0;
-        // Two passes suffice (Kahan, Parlett).
-        for _ in 0..2 {
-            for (own, heavy) in self.basis.iter().zip(&self.weighed) {
-                if interrupt::is_requested() {
-                    return;
-                }
-                let along = dot(heavy, &vector);
-                squared += along * along;
-                vector.iter_mut().zip(own).for_each(|(v, o)| *v -= along * o);
+        Some(space)
+    }
+
+    /// Number of basis vectors whose images are known.
+    fn applied(&self) -> usize {
+        self.images.len()
+    }
+
+    /// Applies the operator to the vectors that were added last, and adds their images; `false` if
+    /// that adds no vectors. `None` if an image cannot be computed, or after a request to stop.
+    fn grow(&mut self, operator: &mut dyn Operator) -> Option<bool> {
+        let block = self.applied()..self.basis.len();
+        let end = block.end;
+        for k in block {
+            if interrupt::is_requested() {
+                return None;
             }
+            let image = operator.apply(&self.basis[k], &self.weighed[k])?;
+            let coordinates = self.add(operator, image);
+            self.images.push(coordinates);
+        }
+        if interrupt::is_requested() { None } else { Some(self.basis.len() > end) }
+    }
+
+    /// Orthogonalises a vector against the basis and adds it, normalised, unless it is linearly
+    /// dependent; its coordinates in the basis.
+    fn add(&mut self, operator: &mut dyn Operator, mut vector: Vec<f64>) -> Vec<f64> {
+        // Two passes suffice (Giraud, Langou, Rozloznik, van den Eshof 2005).
+        let mut coordinates = self.take_basis_out(&mut vector);
+        for (coordinate, rest) in coordinates.iter_mut().zip(self.take_basis_out(&mut vector)) {
+            *coordinate += rest;
         }
         let mut weighed = operator.weigh(&vector);
         let length = dot(&vector, &weighed).max(0.0).sqrt();
-        if length.is_nan() || length <= DEPENDENT_NORM_RATIO * squared.sqrt() {
-            return;
+        let along = coordinates.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if length.is_nan() || length <= DEPENDENT_NORM_RATIO * along {
+            return coordinates;
         }
         vector.iter_mut().for_each(|v| *v /= length);
         weighed.iter_mut().for_each(|v| *v /= length);
         self.basis.push(vector);
         self.weighed.push(weighed);
+        coordinates.push(length);
+        coordinates
     }
 
-    /// Extends the projected operator by the rows and columns of the basis vectors from `first` on.
-    fn project(&mut self, first: usize) {
-        for (i, heavy) in self.weighed.iter().enumerate() {
-            if i >= first {
-                self.projected.push(Vec::new());
-            }
-            if interrupt::is_requested() {
-                return;
-            }
-            let known = self.projected[i].len();
-            for image in &self.images[known..] {
-                self.projected[i].push(dot(heavy, image));
-            }
+    /// Subtracts the part of a vector along the basis, by classical Gram-Schmidt; the coordinates of
+    /// that part.
+    fn take_basis_out(&self, vector: &mut [f64]) -> Vec<f64> {
+        Instructions::here().run(
+            #[inline(always)]
+            || {
+                let coordinates = products(&self.weighed, vector);
+                subtract(&self.basis, &coordinates, vector);
+                coordinates
+            },
+        )
+    }
+
+    /// Relative residual of an eigenvector of the projection, |A x - theta x| over |theta x|, in the
+    /// norm of the inner product: the part of A x outside the vectors with known images.
+    fn residual(&self, value: Complex<f64>, coordinates: &[Complex<f64>]) -> f64 {
+        let mut outside = vec![Complex::<f64>::default(); self.basis.len() - self.applied()];
+        for (coordinate, image) in coordinates.iter().zip(&self.images) {
+            let own = image.get(self.applied()..).unwrap_or_default();
+            outside.iter_mut().zip(own).for_each(|(sum, entry)| *sum += coordinate * entry);
         }
+        let norm = |entries: &[Complex<f64>]| entries.iter().map(Complex::norm_sqr).sum::<f64>().sqrt();
+        norm(&outside) / (norm(coordinates) * value.norm())
+    }
+
+    /// Projection of the operator onto the vectors with known images.
+    fn projection(&self) -> Mat<f64> {
+        let n = self.applied();
+        Mat::from_fn(n, n, |i, j| self.images[j].get(i).copied().unwrap_or(0.0))
     }
 
     fn symmetric_part(&self) -> Mat<f64> {
-        let n = self.projected.len();
-        Mat::from_fn(n, n, |i, j| 0.5 * (self.projected[i][j] + self.projected[j][i]))
-    }
-
-    fn matrix(&self) -> Mat<f64> {
-        let n = self.projected.len();
-        Mat::from_fn(n, n, |i, j| self.projected[i][j])
+        let whole = self.projection();
+        Mat::from_fn(whole.nrows(), whole.ncols(), |i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]))
     }
 
     /// `None` after a request to stop.
     fn eigenvalues(&self, is_symmetric: bool, wanted: usize) -> Option<Vec<Complex<f64>>> {
         let mut values = match is_symmetric {
             true => on_projection(self.symmetric_part(), symmetric_eigenvalues)?,
-            false => on_projection(self.matrix(), eigenvalues)?,
+            false => on_projection(self.projection(), eigenvalues)?,
         };
         values.sort_by(largest_first);
         values.truncate(wanted);
         Some(values)
     }
 
-    /// `None` after a request to stop.
-    fn into_spectrum(self, is_symmetric: bool, wanted: usize) -> Option<Spectrum> {
+    /// The largest eigenvalues with their eigenvectors. `None` after a request to stop.
+    fn pairs(&self, is_symmetric: bool, wanted: usize) -> Option<Vec<Eigenpair>> {
         let mut pairs = match is_symmetric {
             true => on_projection(self.symmetric_part(), symmetric_eigenpairs)?,
-            false => on_projection(self.matrix(), eigenpairs)?,
+            false => on_projection(self.projection(), eigenpairs)?,
         };
         pairs.sort_by(|a, b| largest_first(&a.0, &b.0));
         pairs.truncate(wanted);
-        let (values, coordinates) = pairs.into_iter().unzip();
-        Some(Spectrum { values, coordinates, space: self, was_enough: false })
+        Some(pairs)
     }
 }
 
 /// An eigenvalue of a projection with its eigenvector.
 type Eigenpair = (Complex<f64>, Vec<Complex<f64>>);
 
-/// A result of `solve` for a projection. `None` after a request to stop.
-fn on_projection<R: Send + 'static>(projection: Mat<f64>, solve: fn(&Mat<f64>) -> R) -> Option<R> {
-    match projection.nrows() > LONG_PROJECTION {
-        true => threads::unless_interrupted(move || solve(&projection)),
-        false => Some(solve(&projection)),
+/// A list that `solve` makes of a projection. `None` after a request to stop.
+fn on_projection<R: Send + 'static>(projection: Mat<f64>, solve: fn(&Mat<f64>) -> Vec<R>) -> Option<Vec<R>> {
+    match projection.nrows() {
+        0 => Some(Vec::new()),
+        1..=LONG_PROJECTION => Some(solve(&projection)),
+        _ => threads::unless_interrupted(move || solve(&projection)),
     }
 }
 

@@ -28,7 +28,7 @@ pub use convergence::{Convergence, Judgement, Residual, Verdict, size};
 pub use general::GeneralSolver;
 pub use krylov::{Operator, Spectrum, largest_eigenvalues};
 pub use linear::{Factorisation, LinearSolver};
-pub use modes::{Matrices, ModeSearch, ModeShape, SmallMotion};
+pub use modes::{MIN_GROWTH_RATIO, Matrices, ModeSearch, ModeShape, SmallMotion};
 pub use newton::{Newton, NewtonMemory};
 pub use newton_failure::NewtonFailure;
 pub use pivots::is_symmetric;

@@ -1,6 +1,6 @@
 //! Small motions x exp(s t) with (s^2 M + s C + K) x = 0 nearest to a shift, each verified.
 
-use super::krylov::{Operator, Spectrum, largest_eigenvalues_until, roughly_largest_eigenvalues};
+use super::krylov::{Operator, Spectrum, distinct_eigenvalues_until, largest_eigenvalues, roughly_largest_eigenvalues};
 use super::linear::LinearSolver;
 use super::pivots::is_symmetric;
 use super::softest::lost_part;
@@ -25,6 +25,9 @@ const MAX_ENERGY_IMBALANCE: f64 = 1e-6;
 /// Damping forces below this part of inertia and stiffness forces are taken for zero.
 const NEGLIGIBLE_DAMPING_RATIO: f64 = 1e-14;
 
+/// Inverse iterations after which the slowest motion prevails.
+const INVERSE_ITERATIONS: usize = 3;
+
 /// Number of exponents of a rough estimate that are nearly right.
 const ROUGH_EXPONENTS: usize = 6;
 
@@ -34,6 +37,9 @@ const MAX_UNCERTAINTY: f64 = 1e-9;
 /// Motions slower than this part of the shift are free motions: their stiffness is round-off, and
 /// energies need not balance.
 const FREE_MOTION_RATIO: f64 = 1e-3;
+
+/// Growth above this part of |s| is no round-off.
+pub const MIN_GROWTH_RATIO: f64 = 1e-6;
 
 /// Without damping, a motion with growth above this part of |s| has a decaying counterpart.
 const MIN_FLUTTER_RATIO: f64 = 1e-6;
@@ -57,6 +63,14 @@ pub struct SmallMotion {
     pub(crate) uncertainty: f64,
     /// Shape of an uncertain motion of an undamped symmetric problem
     pub(crate) shape: Option<ModeShape>,
+}
+
+/// Small motions near a shift, as far as they tell stability.
+pub struct GrowthNearby {
+    /// Exponents of the motions, without verification; of multiple ones at least one
+    pub(crate) exponents: Vec<Complex<f64>>,
+    /// Verified motions that grow
+    pub(crate) growing: Vec<SmallMotion>,
 }
 
 /// Shape of a small motion.
@@ -251,15 +265,15 @@ impl<'a> ModeSearch<'a> {
         self.negative == Some(0)
     }
 
-    /// True if `motions`, which are nearest to the shift factorised last, include those near
-    /// another shift.
-    pub fn reaches(&self, motions: &[SmallMotion], other: f64) -> bool {
+    /// True if motions with these exponents, which are nearest to the shift factorised last, include
+    /// those near another shift.
+    pub fn reaches(&self, exponents: impl Iterator<Item = Complex<f64>>, other: f64) -> bool {
         let shift = Complex::from(self.shift);
         let distance = |exponent: Complex<f64>| match self.form {
             ProblemForm::Symmetric | ProblemForm::Undamped => (exponent * exponent - shift * shift).norm(),
             ProblemForm::Gyroscopic | ProblemForm::General => (exponent - shift).norm(),
         };
-        let reach = motions.iter().map(|motion| distance(motion.exponent)).fold(0.0, f64::max);
+        let reach = exponents.map(distance).fold(0.0, f64::max);
         reach >= 2.0 * distance(other.into())
     }
 
@@ -276,6 +290,28 @@ impl<'a> ModeSearch<'a> {
         self.factorisations += 1;
         let done = self.solver.factorise(self.system);
         self.count(done)
+    }
+
+    /// Rough frequency of the slowest motion in rad/s, hardly too low, by inverse iteration with K,
+    /// which must be the matrix factorised last. `None` if a solution fails.
+    pub fn slowest_frequency(&mut self) -> Option<f64> {
+        let mut x: Vec<f64> = (0..self.system.pattern.dof_map.count())
+            .map(|k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract())
+            .collect();
+        let mut weighed = self.system.multiply(&self.matrices.mass, &x);
+        let mut ratio = f64::NAN;
+        let mut before = f64::NAN;
+        for _ in 0..INVERSE_ITERATIONS {
+            x = weighed;
+            if !self.solver.solve_once(self.system, &mut x) {
+                return None;
+            }
+            weighed = self.system.multiply(&self.matrices.mass, &x);
+            let size = dot(&x, &weighed).max(0.0).sqrt();
+            ratio = before / size;
+            before = size;
+        }
+        Some(ratio.sqrt()).filter(|omega| omega.is_finite() && *omega > 0.0)
     }
 
     /// Rough magnitudes |s| of the exponents nearest to the shift; `None` if a solution fails.
@@ -298,67 +334,81 @@ impl<'a> ModeSearch<'a> {
     /// The motions nearest to the shift factorised last, nearest first, without those that fail
     /// verification. `None` if a solution fails, or after a request to stop.
     pub fn nearest(&mut self, wanted: usize) -> Option<Vec<SmallMotion>> {
-        self.nearest_until(wanted, f64::INFINITY)
-    }
-
-    /// Like [`ModeSearch::nearest`], but the search ends as soon as a motion is found that grows by
-    /// more than the part `growth` of its |s|; others may be missing then.
-    pub fn nearest_until(&mut self, wanted: usize, growth: f64) -> Option<Vec<SmallMotion>> {
-        let room = match self.form {
-            ProblemForm::Symmetric | ProblemForm::Undamped => wanted,
-            ProblemForm::Gyroscopic | ProblemForm::General => 2 * wanted + 2,
-        };
-        let shift = self.shift;
-        let form = self.form;
+        let room = self.room(wanted);
         let diagonal = self.inner_product();
-        let mut operator = ModeOperator { search: self, diagonal };
-        let is_enough = |theta: Complex<f64>| {
-            let exponent = form.exponent(shift, theta);
-            // What hardly moves may be round-off.
-            exponent.re > growth * exponent.norm() && exponent.norm() > FREE_MOTION_RATIO * shift
-        };
-        let spectrum = largest_eigenvalues_until(&mut operator, room, &is_enough)?;
-        let allowed = match form {
+        let spectrum = largest_eigenvalues(&mut ModeOperator { search: self, diagonal }, room)?;
+        let allowed = match self.form {
             ProblemForm::Symmetric => MAX_RESIDUAL_OF_SYMMETRIC,
             ProblemForm::Undamped | ProblemForm::Gyroscopic | ProblemForm::General => MAX_RESIDUAL,
         };
-        let mut found = Vec::new();
-        let compared = |theta: Complex<f64>| theta.norm() > 0.0 && (!spectrum.was_enough || is_enough(theta));
-        for (number, &theta) in spectrum.values.iter().enumerate().filter(|(_, theta)| compared(**theta)) {
-            if interrupt::is_requested() {
-                return None;
-            }
-            let exponent = form.exponent(shift, theta);
-            // One exponent of each conjugate pair is kept.
-            let upper = exponent.im > 0.0 || (exponent.im == 0.0 && theta.im >= 0.0);
-            let is_twin = form == ProblemForm::Gyroscopic && exponent.im == 0.0 && exponent.re < 0.0;
-            if upper && !is_twin && spectrum.residual(&mut operator, number) <= allowed {
-                found.push((number, exponent));
-            }
-        }
-        // Verification needs the values of K alone.
-        self.is_ready = false;
-        self.system.values.copy_from_slice(&self.matrices.stiffness);
-        self.system.revision += 1;
+        let is_right = |number: &usize| spectrum.values[*number].norm() > 0.0 && spectrum.residual(*number) <= allowed;
+        self.look_at_stiffness();
         let mut motions = Vec::new();
-        for (number, exponent) in found {
+        for number in (0..spectrum.values.len()).filter(is_right) {
             if interrupt::is_requested() {
                 return None;
             }
-            let Some(motion) = self.check(&spectrum, number, exponent) else { continue };
+            let Some(motion) = self.motion(&spectrum, number) else { continue };
             let s = motion.exponent;
             // Flutter: if s is an exponent, so is -s* (complex conjugate), of equal frequency.
-            let twin = form == ProblemForm::Undamped && s.re > MIN_FLUTTER_RATIO * s.norm() && s.im > 0.0;
+            let twin = self.form == ProblemForm::Undamped && s.re > MIN_FLUTTER_RATIO * s.norm() && s.im > 0.0;
             let twin = twin.then(|| SmallMotion { exponent: -s.conj(), ..motion.clone() });
             motions.push(motion);
             motions.extend(twin);
         }
-        let is_there = motions.iter().any(|motion| motion.exponent.re > growth * motion.exponent.norm());
-        if spectrum.was_enough && !is_there {
-            // The one that was enough has not been confirmed.
-            return if self.factorise(shift) { self.nearest(wanted) } else { None };
-        }
         Some(motions)
+    }
+
+    /// Motions near the shift factorised last, as far as they tell stability. The search ends as
+    /// soon as it finds a motion that grows by more than the part `enough` of its |s|. `None` if a
+    /// solution fails, or after a request to stop.
+    pub fn growth(&mut self, wanted: usize, enough: f64) -> Option<GrowthNearby> {
+        let room = self.room(wanted);
+        let shift = self.shift;
+        let form = self.form;
+        let diagonal = self.inner_product();
+        let is_enough = |s: Complex<f64>| s.re > enough * s.norm();
+        // What hardly moves may be round-off.
+        let moves = |s: Complex<f64>| s.norm() > FREE_MOTION_RATIO * shift;
+        let ends = |theta: Complex<f64>| Some(form.exponent(shift, theta)).is_some_and(|s| is_enough(s) && moves(s));
+        let spectrum = distinct_eigenvalues_until(&mut ModeOperator { search: self, diagonal }, room, &ends)?;
+        let exponents: Vec<Complex<f64>> = spectrum.values.iter().map(|&theta| form.exponent(shift, theta)).collect();
+        self.look_at_stiffness();
+        let growing: Vec<SmallMotion> = (0..exponents.len())
+            .filter(|&number| exponents[number].re > MIN_GROWTH_RATIO * exponents[number].norm())
+            .filter_map(|number| self.motion(&spectrum, number))
+            .collect();
+        let is_confirmed = growing.iter().any(|motion| is_enough(motion.exponent));
+        if !is_confirmed && spectrum.values.iter().any(|&theta| ends(theta)) {
+            // Others may be missing.
+            return if self.factorise(shift) { self.growth(wanted, f64::INFINITY) } else { None };
+        }
+        Some(GrowthNearby { exponents, growing })
+    }
+
+    /// Number of eigenvalues of the operator that belong to this number of motions.
+    fn room(&self, motions: usize) -> usize {
+        match self.form {
+            ProblemForm::Symmetric | ProblemForm::Undamped => motions,
+            ProblemForm::Gyroscopic | ProblemForm::General => 2 * motions + 2,
+        }
+    }
+
+    /// Restores the values of K, with which motions are verified.
+    fn look_at_stiffness(&mut self) {
+        self.is_ready = false;
+        self.system.values.copy_from_slice(&self.matrices.stiffness);
+        self.system.revision += 1;
+    }
+
+    /// The verified motion of an eigenvalue of the operator; one of each conjugate pair. `None` for
+    /// the other, or if verification fails.
+    fn motion(&self, spectrum: &Spectrum, number: usize) -> Option<SmallMotion> {
+        let theta = spectrum.values[number];
+        let exponent = self.form.exponent(self.shift, theta);
+        let is_upper = exponent.im > 0.0 || (exponent.im == 0.0 && theta.im >= 0.0);
+        let is_twin = self.form == ProblemForm::Gyroscopic && exponent.im == 0.0 && exponent.re < 0.0;
+        if is_upper && !is_twin { self.check(spectrum, number, exponent) } else { None }
     }
 
     /// A verified motion: multiplied by x* from the left, m s^2 + c s + k = 0. `None` if the terms
@@ -427,13 +477,14 @@ impl Operator for ModeOperator<'_, '_> {
         if self.is_doubled() { 2 * n } else { n }
     }
 
-    fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>> {
+    fn apply(&mut self, x: &[f64], weighed: &[f64]) -> Option<Vec<f64>> {
         let doubled = self.is_doubled();
         let ModeSearch { system, solver, matrices, shift: e, .. } = &mut *self.search;
         let n = system.pattern.dof_map.count();
         let e = *e;
         if !doubled {
-            let mut out = system.multiply(&matrices.mass, x);
+            // The inner product is that of M.
+            let mut out = weighed.to_vec();
             let done = solver.solve_once(system, &mut out);
             self.search.project(&mut out);
             return done.then_some(out);

@@ -67,6 +67,14 @@ impl LinearSolver {
         Some(Signature::Parity { is_odd })
     }
 
+    /// Signature of the tangent of a system that stays, factorised last; see
+    /// [`LinearSolver::signature`].
+    pub fn signature_of_last(&mut self, system: &System) -> Option<Signature> {
+        let negative = if self.is_symmetric() { self.negative_of_last() } else { self.negative_beside(system) };
+        let parity = || self.has_negative_determinant().map(|is_odd| Signature::Parity { is_odd });
+        negative.map(Signature::Negative).or_else(parity)
+    }
+
     /// Number of negative eigenvalues of the tangent on the space that satisfies the constraints;
     /// `None` if it is unsymmetric, or the factorisation fails. If this solver's own factorisation
     /// tells it, the tangent is factorised by it and may be overwritten.

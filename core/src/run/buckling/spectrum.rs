@@ -96,7 +96,7 @@ impl Operator for Softening<'_> {
         self.system.pattern.dof_map.count()
     }
 
-    fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>> {
+    fn apply(&mut self, x: &[f64], _weighed: &[f64]) -> Option<Vec<f64>> {
         let mut out = self.system.multiply(self.varied, x);
         out.iter_mut().for_each(|v| *v = -*v);
         self.solver.solve_once(self.system, &mut out).then_some(out)

@@ -7,7 +7,7 @@ mod vibrations;
 pub(super) use vibrations::{Vibrations, vibrations};
 
 use self::rigid::{free_spins, rigid_motions};
-use self::search::{Found, Wanted, find_modes, first_shift, grows, matrices};
+use self::search::{Found, find_modes, first_shift, grows, matrices};
 use super::failure::Failure;
 use super::results::{Mode, StageResult};
 use super::stage_run::{Analysis, StageRun, Teller};
@@ -92,8 +92,7 @@ impl Modal<'_, '_> {
         let shift = first_shift(matrices, &assembly.system);
         let mut search = ModeSearch::new(&mut assembly.system, &mut newton.solver, matrices, rigid);
         let tell = &mut |done| teller.tell(done);
-        let wanted = Wanted { modes: self.modes, enough: f64::INFINITY };
-        let found = find_modes(&mut search, shift, wanted, tell, &mut counters.work)?;
+        let found = find_modes(&mut search, shift, self.modes, tell, &mut counters.work)?;
         self.stage.unless_interrupted()?;
         found.ok_or_else(|| {
             let why = "the modes could not be found: a solve with the tangent failed. Look for stiffnesses or masses \

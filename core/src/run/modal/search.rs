@@ -3,8 +3,9 @@
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model};
 use crate::run::failure::Failure;
-use crate::solve::{Matrices, ModeSearch, SmallMotion, Work, timed};
+use crate::solve::{MIN_GROWTH_RATIO, Matrices, ModeSearch, SmallMotion, Work, timed};
 use crate::system::{State, System};
+use nalgebra::Complex;
 
 /// Part of the lowest frequencies at which the first look is taken.
 const FIRST_SHIFT: f64 = 1e-4;
@@ -25,19 +26,8 @@ const MOST_DOUBLINGS: usize = 64;
 const MOST_SEARCHES: usize = 4;
 /// Exponents that agree to this, relative, are one that two looks have found.
 const SAME: f64 = 1e-6;
-/// Growth above this part of |s| is no round-off.
-const GROWS: f64 = 1e-6;
 /// Motions slower than this part of the others tell nothing of their frequencies.
 const FREE: f64 = 1e-4;
-
-/// What a search is to find.
-#[derive(Clone, Copy)]
-pub struct Wanted {
-    /// Number of modes, slowest first
-    pub modes: usize,
-    /// Growth, as a part of |s|, of a motion that ends the search at once; infinite if all are wanted
-    pub enough: f64,
-}
 
 /// The modes of a stage, and what is known about them.
 #[derive(Default)]
@@ -72,6 +62,9 @@ pub fn matrices(assembly: &mut Assembly, state: &State, model: &Model) -> Matric
 
 /// Multipliers have no mass.
 fn drop_multipliers(system: &System, model: &Model, values: &mut [f64]) {
+    if model.multipliers.is_empty() {
+        return;
+    }
     let pattern = &system.pattern;
     let is_multiplier: Vec<bool> = (0..pattern.dof_map.count())
         .map(|k| model.kinds[pattern.dof_map.direction(k).slot as usize].is_multiplier())
@@ -83,13 +76,13 @@ fn drop_multipliers(system: &System, model: &Model, values: &mut [f64]) {
     }
 }
 
-/// A few looks place the shift below the lowest frequency, from `shift` on; then all modes are
-/// searched from there. `tell` is told the part of the search that lies behind. `None` where a
-/// solve with the tangent fails.
+/// A few looks place the shift below the lowest frequency, from `shift` on; then `modes` modes and
+/// all that grow are searched from there. `tell` is told the part of the search that lies behind.
+/// `None` where a solve with the tangent fails.
 pub fn find_modes(
     search: &mut ModeSearch,
     mut shift: f64,
-    wanted: Wanted,
+    modes: usize,
     tell: &mut dyn FnMut(f64) -> Result<(), Failure>,
     work: &mut Work,
 ) -> Result<Option<Found>, Failure> {
@@ -105,7 +98,7 @@ pub fn find_modes(
         shift = SHIFT * lowest;
     }
     tell(0.5)?;
-    let found = timed(&mut work.solve_seconds, || find_all(search, shift, wanted));
+    let found = timed(&mut work.solve_seconds, || find_all(search, shift, modes));
     work.factorisations += search.factorisations;
     Ok(found)
 }
@@ -120,21 +113,16 @@ pub fn first_shift(matrices: &Matrices, system: &System) -> f64 {
 /// All modes that are asked for, and all unstable ones: where pivots count them, until they are
 /// complete; else among more than are asked for, and from shifts further out. `None` where a
 /// solution fails.
-fn find_all(search: &mut ModeSearch, shift: f64, wanted: Wanted) -> Option<Found> {
-    let Wanted { modes, enough } = wanted;
+fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> {
     let mut found = Found { rigid: search.rigid(), ..Found::default() };
     if !search.factorise(shift) {
         return None;
     }
     let Some(unstable) = search.growing() else {
         let is_held = search.is_held();
-        found.motions = search.nearest_until(modes + SPARE, enough)?;
-        if found.motions.iter().any(|motion| motion.exponent.re > enough * motion.exponent.norm()) {
-            return Some(found);
-        }
-        let further = FURTHER.map(|times| times * shift);
-        let unseen = further.into_iter().filter(|&further| !is_held && !search.reaches(&found.motions, further));
-        for further in unseen.collect::<Vec<f64>>() {
+        found.motions = search.nearest(modes + SPARE)?;
+        let exponents: Vec<Complex<f64>> = found.motions.iter().map(|motion| motion.exponent).collect();
+        for further in unseen(search, &exponents, shift).filter(|_| !is_held) {
             add_new(&mut found.motions, growing_from(search, further, SPARE));
         }
         return Some(found);
@@ -153,6 +141,39 @@ fn find_all(search: &mut ModeSearch, shift: f64, wanted: Wanted) -> Option<Found
         wanted *= 2;
     }
     Some(found)
+}
+
+/// Verified motions that grow, among the `modes` slowest and among those around shifts further out
+/// that these do not reach. The search ends as soon as one grows by more than the part `enough` of
+/// its |s|. K must be the matrix factorised last. `None` where a solution fails, or nothing is
+/// found.
+pub fn find_growth(search: &mut ModeSearch, modes: usize, enough: f64) -> Option<Vec<SmallMotion>> {
+    let shift = SHIFT * search.slowest_frequency()?;
+    if !search.factorise(shift) {
+        return None;
+    }
+    let is_held = search.is_held();
+    let slowest = search.growth(modes, enough)?;
+    if slowest.exponents.is_empty() {
+        return None;
+    }
+    let mut growing = slowest.growing;
+    let is_enough = |motion: &SmallMotion| motion.exponent.re > enough * motion.exponent.norm();
+    for further in unseen(search, &slowest.exponents, shift).filter(|_| !is_held) {
+        if growing.iter().any(is_enough) {
+            break;
+        }
+        let found = search.factorise(further).then(|| search.growth(SPARE, enough)).flatten();
+        growing.extend(found.map(|found| found.growing).unwrap_or_default());
+    }
+    Some(growing)
+}
+
+/// Shifts further out that motions with these exponents, nearest to `shift`, do not reach.
+fn unseen(search: &ModeSearch, exponents: &[Complex<f64>], shift: f64) -> std::vec::IntoIter<f64> {
+    let further = FURTHER.map(|times| times * shift);
+    let unseen = further.into_iter().filter(|&further| !search.reaches(exponents.iter().copied(), further));
+    unseen.collect::<Vec<f64>>().into_iter()
 }
 
 /// The motions nearest to a shift; `None` where a solution fails.
@@ -206,7 +227,7 @@ fn lowest(sizes: &[f64]) -> Option<f64> {
 }
 
 pub fn grows(motion: &SmallMotion) -> bool {
-    motion.exponent.re > GROWS * motion.exponent.norm()
+    motion.exponent.re > MIN_GROWTH_RATIO * motion.exponent.norm()
 }
 
 /// Adds motions that are not known yet.

@@ -8,16 +8,18 @@
 //! positive for large s. Without masses no more is known: for each K that is not symmetric there
 //! are masses with which something grows.
 
-use super::search::{Wanted, find_modes, first_shift, grows, matrices};
+use super::search::{find_growth, matrices};
 use crate::model::{Assembly, StageContext, StageKind};
 use crate::run::failure::Failure;
 use crate::run::results::Mode;
 use crate::run::stage_run::{StageRun, Teller};
-use crate::solve::{LinearSolver, ModeSearch, Signature, SmallMotion, Tangent};
+use crate::solve::{LinearSolver, ModeSearch, Signature, SmallMotion, Tangent, timed};
 
-/// Modes that are looked for at least, slowest first, unless one grows by more than a thousandth of
-/// its |s|, which is no round-off: it tells enough.
-const WANTED: Wanted = Wanted { modes: 8, enough: 1e-3 };
+/// Number of modes that are looked at, slowest first
+const MODES: usize = 32;
+
+/// A mode that grows by more than this part of its |s|, which is no round-off, tells enough.
+const ENOUGH_GROWTH: f64 = 1e-3;
 
 /// Growth that is less than so many times what round-off may have taken of |s| is in doubt.
 const SURELY: f64 = 10.0;
@@ -71,7 +73,7 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
     if let Some(Signature::Parity { is_odd: true }) = signature {
         return Ok(Vibrations::Diverging);
     }
-    match solver.signature(&mut Tangent::that_stays(&mut assembly, stage.state)) {
+    match solver.signature_of_last(&assembly.system) {
         Some(Signature::Negative(count)) => return Ok(Vibrations::Counted(count)),
         Some(Signature::Parity { is_odd: true }) => return Ok(Vibrations::Diverging),
         Some(Signature::Parity { is_odd: false }) | None => {}
@@ -82,21 +84,21 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
     let at = stage.moment();
     let StageRun { observer, counters, number, plan, .. } = stage;
     let mut teller = Teller { observer: &mut **observer, at, number: *number, stages: plan.stages.len() };
-    let shift = first_shift(&matrices, &assembly.system);
-    let mut search = ModeSearch::new(&mut assembly.system, &mut solver, &matrices, Vec::new());
     // The stage itself lies behind.
-    let found = find_modes(&mut search, shift, WANTED, &mut |_| teller.tell(1.0), &mut counters.work)?;
-    Ok(found.map_or(Vibrations::Unknown, |found| judge(&found.motions)))
+    teller.tell(1.0)?;
+    let mut search = ModeSearch::new(&mut assembly.system, &mut solver, &matrices, Vec::new());
+    let found = timed(&mut counters.work.solve_seconds, || find_growth(&mut search, MODES, ENOUGH_GROWTH));
+    counters.work.factorisations += search.factorisations;
+    Ok(found.map_or(Vibrations::Unknown, |growing| judge(&growing)))
 }
 
-/// The verdict of these motions.
-fn judge(motions: &[SmallMotion]) -> Vibrations {
+/// The verdict of the motions that grow.
+fn judge(growing: &[SmallMotion]) -> Vibrations {
     let surely = |motion: &&SmallMotion| motion.exponent.re > SURELY * motion.uncertainty * motion.exponent.norm();
-    let growing = || motions.iter().filter(|motion| grows(motion));
-    let fastest = growing().filter(surely).max_by(|a, b| a.exponent.re.total_cmp(&b.exponent.re));
+    let fastest = growing.iter().filter(surely).max_by(|a, b| a.exponent.re.total_cmp(&b.exponent.re));
     match fastest {
         Some(motion) => Vibrations::Growing(Mode { omega: motion.exponent.im, growth: motion.exponent.re }),
-        None if motions.is_empty() || growing().next().is_some() => Vibrations::Unknown,
-        None => Vibrations::Bounded,
+        None if growing.is_empty() => Vibrations::Bounded,
+        None => Vibrations::Unknown,
     }
 }
