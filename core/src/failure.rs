@@ -56,6 +56,8 @@ failure_kinds! {
     ContactStart: "contact_start", Deck;
     /// A beam or a body may have passed through a surface.
     ContactPassed: "contact_passed", Numerics;
+    /// A node has slid to the end of the beam on which it slides.
+    SliderEnd: "slider_end", Numerics;
     /// A force, a motion or a result is not finite.
     NonFinite: "non_finite", Numerics;
     /// The total energy grows without work of loads or drives.

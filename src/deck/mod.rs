@@ -37,6 +37,7 @@ mod scheme;
 mod section;
 mod section_shape;
 mod shown;
+mod slider;
 mod spring;
 mod stage;
 mod support;
@@ -80,6 +81,7 @@ pub use section_shape::{
     Wall, WallPlies, WallSideWord, Walls, Web,
 };
 pub use shown::{hides_text, shown, shown_in_line};
+pub use slider::{Slider, SliderDrive, Sliding};
 pub use spring::{Spring, SpringBody};
 pub use stage::{MOST_STEPS, RotatingFrame, STEP_TOLERANCE, Stage, StageBody, Until};
 pub use support::Support;
@@ -116,6 +118,8 @@ pub struct Deck {
     pub motions: Vec<Motion>,
     /// Joints
     pub joints: Vec<Joint>,
+    /// Sliding joints along beams
+    pub sliders: Vec<Slider>,
     /// Rigid bodies
     pub bodies: Vec<Body>,
     /// Springs and cables
@@ -155,10 +159,10 @@ pub struct Deck {
 }
 
 /// Keys of a deck.
-const KEYS: [&str; 26] = [
+const KEYS: [&str; 27] = [
     "title", "units", "gravity", "param", "point", "material", "layup", "section", "beam", "support", "motion",
-    "joint", "body", "spring", "surface", "contact", "load", "initial", "history", "stage", "effects", "output",
-    "cost", "accuracy", "damping", "expect",
+    "joint", "slider", "body", "spring", "surface", "contact", "load", "initial", "history", "stage", "effects",
+    "output", "cost", "accuracy", "damping", "expect",
 ];
 
 /// Reads a deck. Errors and warnings are returned beside it, so that the scene can add its own;
@@ -265,6 +269,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         supports: listed(&top, "support", support::read_support),
         motions: listed(&top, "motion", motion::read_motion),
         joints,
+        sliders: listed(&top, "slider", slider::read_slider),
         bodies,
         springs: listed(&top, "spring", spring::read_spring),
         surfaces,

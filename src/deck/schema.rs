@@ -266,6 +266,8 @@ mod tests {
             ("section.region.outline", vec!["csv"]),
             ("section.skin", deck::section_shape::SKIN_KEYS.to_vec()),
             ("section.webs", deck::section_shape::WEB_KEYS.to_vec()),
+            ("slider", deck::slider::KEYS.to_vec()),
+            ("slider.history", deck::history::USE_KEYS.to_vec()),
             ("spring", deck::spring::KEYS.to_vec()),
             ("stage", deck::stage::KEYS.to_vec()),
             ("stage.frame", deck::stage::FRAME_KEYS.to_vec()),

@@ -343,7 +343,7 @@ enum FailureNumbers {
     StepTooSmall { error: Number, share: Number },
     Penetration { node: String, depth: Number },
     ContactStart { contact: String, surface: String, node: String, depth: Number },
-    ContactPassed { node: String },
+    OfNode { node: String },
     NonFinite { effect: Option<String>, node: String },
     MeshTooCoarse { nodes: [String; 2], relative_rotation: Number },
     EnergyGrowth { grown: Number, largest: Number },
@@ -637,6 +637,7 @@ fn moment_of(failure: &Failure) -> Option<&Moment> {
         | Failure::Penetration { at, .. }
         | Failure::ContactStart { at, .. }
         | Failure::ContactPassed { at, .. }
+        | Failure::SliderEnd { at, .. }
         | Failure::NonFinite { at, .. }
         | Failure::MeshTooCoarse { at, .. }
         | Failure::EnergyGrowth { at, .. }
@@ -654,6 +655,7 @@ fn place_of(failure: &Failure) -> Option<&Place> {
         | Failure::Penetration { .. }
         | Failure::ContactStart { .. }
         | Failure::ContactPassed { .. }
+        | Failure::SliderEnd { .. }
         | Failure::NonFinite { .. }
         | Failure::MeshTooCoarse { .. }
         | Failure::EnergyGrowth { .. }
@@ -693,7 +695,9 @@ fn numbers_of(failure: &Failure) -> Option<FailureNumbers> {
             node: node.clone(),
             depth: Number(*depth),
         },
-        Failure::ContactPassed { node, .. } => FailureNumbers::ContactPassed { node: node.clone() },
+        Failure::ContactPassed { node, .. } | Failure::SliderEnd { node, .. } => {
+            FailureNumbers::OfNode { node: node.clone() }
+        }
         Failure::NonFinite { effect, node, .. } => {
             FailureNumbers::NonFinite { effect: effect.map(String::from), node: node.clone() }
         }

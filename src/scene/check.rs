@@ -190,9 +190,10 @@ pub fn histories_in(deck: &Deck, stage: usize) -> impl Iterator<Item = &Spanned<
     let loads = deck.loads.iter().filter(move |l| acts(&l.stages)).filter_map(|l| l.history.as_ref());
     let motions = deck.motions.iter().filter(move |m| acts(&m.stages)).filter_map(|m| m.history.as_ref());
     let motors = deck.joints.iter().filter_map(|j| j.motor.as_ref()).filter_map(|motor| motor.history.as_ref());
+    let drives = deck.sliders.iter().filter_map(|s| s.drive.as_ref()).filter_map(|drive| drive.history.as_ref());
     let surfaces = deck.surfaces.iter().filter(move |s| acts(&s.stages)).filter_map(|s| s.history.as_ref());
     let strains = deck.beams.iter().filter_map(|b| b.free_strain.as_ref()).filter_map(|f| f.history.as_ref());
-    let all = loads.chain(motions).chain(motors).chain(strains).chain(surfaces);
+    let all = loads.chain(motions).chain(motors).chain(drives).chain(strains).chain(surfaces);
     all.filter(move |history| history.goes_on_in(stage)).map(|history| &history.name)
 }
 

@@ -283,8 +283,12 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let mut found = Vec::new();
     let connections = joints::find(deck, &mesh, &mut found);
     let composition = compose::compose(deck, &mesh, &histories, &connections, &mut found);
-    let SceneConstraints { supports, motions, driven } =
+    let SceneConstraints { supports, mut motions, mut driven } =
         constraints::constraints(deck, &mesh, &histories, &connections, &mut found);
+    for slid in composition.slider_motions.iter().cloned() {
+        driven.push(compose::DrivenTable { drives: beamsim_core::run::Driven::Motion(motions.len()), ..slid.table });
+        motions.push(slid.motion);
+    }
     let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity };
     let probes = columns.written(&mut found);
     let stages = stages(deck, &columns, &mut found);

@@ -13,6 +13,7 @@ pub mod inertia;
 pub mod joint;
 pub mod load;
 pub mod resistance;
+pub mod sliding;
 pub mod spin_hold;
 pub mod spring;
 mod volume;
@@ -224,6 +225,11 @@ pub trait Constraint {
     /// The forces on a node of joints to ground with multipliers, in the sign of internal forces:
     /// force (spatial), and moment conjugate to the rotation vector.
     fn held_by_ground(&self, at: &State, node: Node) -> (Vec3, Vec3);
+
+    /// The displacement of a node that has slid beyond the end of the beam it slides on.
+    fn left(&self, _at: &State) -> Option<Slot> {
+        None
+    }
 }
 
 /// The role of effects with stresses at integration points.

@@ -55,7 +55,10 @@ impl Largest {
     /// Updates squares of these quantities with those of a slot.
     #[inline(always)]
     pub(super) fn take(&mut self, kind: SlotKind, error: Vec3, moved: Vec3) {
-        let of_kind = if kind == SlotKind::Displacement { &mut self.displacement } else { &mut self.rotation };
+        let of_kind = match kind {
+            SlotKind::Displacement | SlotKind::Sliding => &mut self.displacement,
+            SlotKind::Rotation | SlotKind::Force | SlotKind::Moment => &mut self.rotation,
+        };
         *of_kind = of_kind.max(error.squared());
         self.moved = self.moved.max(moved.squared());
     }

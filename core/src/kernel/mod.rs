@@ -8,6 +8,7 @@ pub mod beam;
 pub mod contact;
 pub mod elastic;
 pub mod element;
+pub mod guide;
 pub mod inertia;
 pub mod joint;
 pub mod law;

@@ -53,11 +53,13 @@ pub enum SlotKind {
     Force,
     /// Multipliers of gaps between directions: moments
     Moment,
+    /// The sliding of a node along a beam, a length in the first component
+    Sliding,
 }
 
 impl SlotKind {
     /// All of them, in their order
-    pub const ALL: [Self; 4] = [Self::Displacement, Self::Rotation, Self::Force, Self::Moment];
+    pub const ALL: [Self; 5] = [Self::Displacement, Self::Rotation, Self::Force, Self::Moment, Self::Sliding];
 
     /// Tells whether it holds multipliers: no unknowns of motion, with gaps in the place of forces.
     pub fn is_multiplier(self) -> bool {
@@ -69,10 +71,10 @@ impl SlotKind {
         if self == Self::Rotation { length } else { 1.0 }
     }
 
-    /// The scale that the unknowns of such a slot are compared with: a length for displacements, 1
-    /// for rotations.
+    /// The scale that the unknowns of such a slot are compared with: a length for displacements and
+    /// for sliding, 1 for rotations.
     pub fn scale(self, length: f64) -> f64 {
-        if self == Self::Displacement { length } else { 1.0 }
+        if matches!(self, Self::Displacement | Self::Sliding) { length } else { 1.0 }
     }
 }
 
@@ -266,7 +268,9 @@ impl Model {
         let normal = plane.normal();
         let aside = |(kind, value): (&SlotKind, &Vec3)| match kind {
             SlotKind::Rotation => (*value - normal * value.dot(normal)).norm(),
-            SlotKind::Displacement | SlotKind::Force | SlotKind::Moment => value.dot(normal).abs() / self.length,
+            SlotKind::Displacement | SlotKind::Force | SlotKind::Moment | SlotKind::Sliding => {
+                value.dot(normal).abs() / self.length
+            }
         };
         let size = |(kind, value): (&SlotKind, &Vec3)| value.norm() / kind.scale(self.length);
         [&state.q[..], &state.v, &state.a].into_iter().all(|field| {

@@ -12,8 +12,8 @@ use std::sync::Arc;
 pub struct ModelParts {
     /// The names of the nodes, by their slots
     pub names: Names,
-    /// The slots of multipliers, which follow those of the nodes: their kinds, and the joints that
-    /// they are named after
+    /// The slots of joints, which follow those of the nodes: multipliers and sliding, with the names
+    /// of the joints
     pub multipliers: Vec<(SlotKind, String)>,
     /// The beam elements in their order
     pub elements: Vec<ElementInfo>,
@@ -47,7 +47,7 @@ impl ModelParts {
             kinds.push(kind);
         }
         Model {
-            multipliers: (slots as Slot..kinds.len() as Slot).collect(),
+            multipliers: (slots as Slot..kinds.len() as Slot).filter(|&k| kinds[k as usize].is_multiplier()).collect(),
             kinds: Arc::new(kinds),
             names: Arc::new(names),
             angles: sprung_joints.len(),

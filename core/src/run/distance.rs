@@ -14,7 +14,7 @@ pub(super) fn distance(model: &Model, a: &State, b: &State) -> f64 {
     let one = |slot: usize| match model.kinds[slot] {
         SlotKind::Displacement => (b.q[slot] - a.q[slot]).norm() / model.length,
         SlotKind::Rotation => relative_angle(Rotation::new(a.q[slot]).r, Rotation::new(b.q[slot]).r),
-        SlotKind::Force | SlotKind::Moment => 0.0,
+        SlotKind::Force | SlotKind::Moment | SlotKind::Sliding => 0.0,
     };
     threads::largest(model.kinds.len(), |part| part.map(one).fold(0.0, f64::max))
 }

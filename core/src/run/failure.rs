@@ -126,6 +126,13 @@ pub enum Failure {
         /// The node
         node: String,
     },
+    /// A node has slid to the end of the beam on which it slides.
+    SliderEnd {
+        /// When
+        at: Moment,
+        /// The node
+        node: String,
+    },
     /// A force, a motion or a result that is not finite
     NonFinite {
         /// When
@@ -201,6 +208,7 @@ impl Failure {
             | Self::Penetration { .. } => FailureKind::NotConverged,
             Self::ContactStart { .. } => FailureKind::ContactStart,
             Self::ContactPassed { .. } => FailureKind::ContactPassed,
+            Self::SliderEnd { .. } => FailureKind::SliderEnd,
             Self::Singular { .. } => FailureKind::Singular,
             Self::NonFinite { .. } => FailureKind::NonFinite,
             Self::MeshTooCoarse { .. } => FailureKind::MeshTooCoarse,
@@ -242,7 +250,7 @@ impl fmt::Display for Place {
         let what = match self.kind {
             SlotKind::Displacement => "displacement",
             SlotKind::Rotation => "rotation",
-            SlotKind::Force | SlotKind::Moment => {
+            SlotKind::Force | SlotKind::Moment | SlotKind::Sliding => {
                 return f.write_str(&self.node);
             }
         };
@@ -309,6 +317,9 @@ impl fmt::Display for Failure {
                 "node \"{node}\" may have passed through a surface: in one step it moves by more than the depth of the \
                  surface ({at})"
             ),
+            Self::SliderEnd { at, node } => {
+                write!(f, "node \"{node}\" slides beyond the end of the beam on which it slides ({at})")
+            }
             Self::NonFinite { at, effect, node } => {
                 let effect = effect.unwrap_or("the sum of forces");
                 write!(f, "{effect} is infinite or not a number at \"{node}\" ({at})")

@@ -37,6 +37,9 @@ impl Failure {
                 "move the surface or the beam apart (the radius of the contact counts), or allow a larger `penetration`"
                     .into(),
             ),
+            Self::SliderEnd { .. } => Some(
+                "end the stage before (`until`), make the beam longer, or stop the node by a spring".into(),
+            ),
             Self::ContactPassed { .. } => Some("take more `steps`, or a smaller `step`".into()),
             Self::MeshTooCoarse { .. } => Some("use more `elements` there".into()),
             Self::EnergyGrowth { at, .. } => {

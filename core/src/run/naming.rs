@@ -43,6 +43,7 @@ impl StageRun<'_> {
             NewtonFailure::Penetrates { slot, depth } => {
                 Failure::Penetration { at, node: self.model.node_at(slot), depth }
             }
+            NewtonFailure::Leaves { slot } => Failure::SliderEnd { at, node: self.model.node_at(slot) },
             NewtonFailure::Passes { slot } => Failure::ContactPassed { at, node: self.model.node_at(slot) },
             NewtonFailure::NotFinite { effect, slot } => {
                 Failure::NonFinite { at, effect, node: self.model.node_at(slot) }

@@ -336,6 +336,14 @@ impl StageRun<'_> {
         }
     }
 
+    /// A node may have slid beyond the end of the beam on which it slides.
+    pub fn refuse_departures(&self) -> Result<(), NewtonFailure> {
+        match self.model.constraints().find_map(|constraint| constraint.left(self.state)) {
+            Some(slot) => Err(NewtonFailure::Leaves { slot: slot as usize }),
+            None => Ok(()),
+        }
+    }
+
     /// Between the last good state and this one a node may have passed through a surface: smaller
     /// steps tell.
     pub fn refuse_passing(&self) -> Result<(), NewtonFailure> {

@@ -20,6 +20,10 @@ use std::collections::BTreeMap;
 /// that these remain stiff when they lose their own stiffness.
 const RELATIVE_WEIGHT: f64 = 8.0;
 
+/// A stiffness below this part of the largest one of a constraint is round-off, such as that of the
+/// sliding along a line that is nearly straight: a weight from it would leave a pivot of round-off.
+const NEGLIGIBLE: f64 = 1e-12;
+
 /// The multipliers of a pattern, and the values of the last prepared tangent.
 pub struct Constraints {
     rows: Vec<Multiplier>,
@@ -154,7 +158,8 @@ impl Multiplier {
     /// scene is used.
     fn weight(&self, values: &[f64], largest: f64) -> f64 {
         let square = |tie: &ConstrainedUnknown| (values[tie.of_column] * values[tie.of_row]).abs();
-        let stiff = self.ties.iter().filter(|tie| values[tie.diagonal] != 0.0);
+        let stiffest = self.ties.iter().map(|tie| values[tie.diagonal].abs()).fold(0.0, f64::max);
+        let stiff = self.ties.iter().filter(|tie| values[tie.diagonal].abs() > NEGLIGIBLE * stiffest);
         let softness: f64 = stiff.map(|tie| square(tie) / values[tie.diagonal].abs()).sum();
         let squares: f64 = self.ties.iter().map(square).sum();
         match (softness > 0.0, squares > 0.0) {

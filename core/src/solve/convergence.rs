@@ -104,12 +104,12 @@ impl Convergence {
             let tolerated = match kind {
                 SlotKind::Force => RELATIVE_GAP_TOLERANCE * self.tolerance * model.length,
                 SlotKind::Moment => RELATIVE_GAP_TOLERANCE * self.tolerance,
-                SlotKind::Displacement => self.tolerance * force,
+                SlotKind::Displacement | SlotKind::Sliding => self.tolerance * force,
                 SlotKind::Rotation => self.tolerance * force * model.length,
             };
             let allowed = match kind {
                 SlotKind::Force | SlotKind::Moment => tolerated,
-                SlotKind::Displacement => tolerated.max(ROUND_OFF_FACTOR * round_off.force),
+                SlotKind::Displacement | SlotKind::Sliding => tolerated.max(ROUND_OFF_FACTOR * round_off.force),
                 SlotKind::Rotation => tolerated.max(ROUND_OFF_FACTOR * round_off.moment),
             };
             worst.noisy |= peak.size > tolerated;
@@ -137,7 +137,7 @@ struct Peaks {
     force: f64,
     moment: f64,
     /// Largest free residual for each [`SlotKind`]
-    residuals: [Peak; 4],
+    residuals: [Peak; SlotKind::ALL.len()],
     /// Zero; NaN if some value is not finite, which maxima may ignore
     poison: f64,
 }
@@ -159,8 +159,8 @@ impl Peaks {
         let dof_map = &system.pattern.dof_map;
         // In a tilted plane, vectors have round-off out of the plane.
         let tilted = dof_map.plane().is_some_and(Plane::is_tilted);
-        let mut forces = [0.0; 4];
-        let mut residuals = [Peak::default(); 4];
+        let mut forces = [0.0; SlotKind::ALL.len()];
+        let mut residuals = [Peak::default(); SlotKind::ALL.len()];
         let mut poison = 0.0;
         for (slot, &kind) in slots.clone().zip(&model.kinds[slots]) {
             let mut total = Vec3::ZERO;
@@ -229,13 +229,13 @@ fn free_part(dof_map: &DofMap, slot: Slot, force: Vec3) -> Vec3 {
 /// relative to the length of the scene. NaN entries are ignored.
 pub fn size(model: &Model, motion: &[Vec3]) -> f64 {
     threads::largest(motion.len(), |slots| {
-        let mut squares = [0.0_f64; 4];
+        let mut squares = [0.0_f64; SlotKind::ALL.len()];
         for (&kind, vector) in model.kinds[slots.clone()].iter().zip(&motion[slots]) {
             let largest = &mut squares[kind as usize];
             *largest = largest.max(vector.squared());
         }
-        let [displacement, rotation] =
-            [SlotKind::Displacement, SlotKind::Rotation].map(|kind| squares[kind as usize].sqrt());
-        rotation.max(displacement / model.length)
+        let [displacement, rotation, sliding] =
+            [SlotKind::Displacement, SlotKind::Rotation, SlotKind::Sliding].map(|kind| squares[kind as usize].sqrt());
+        rotation.max(displacement.max(sliding) / model.length)
     })
 }

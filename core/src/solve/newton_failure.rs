@@ -53,6 +53,11 @@ pub enum NewtonFailure {
         /// Slot of the node
         slot: usize,
     },
+    /// A node has slid beyond the end of a beam.
+    Leaves {
+        /// Slot of the node
+        slot: usize,
+    },
     /// A force is not finite.
     NotFinite {
         /// Effect that computed the force; `None` if only a sum overflows

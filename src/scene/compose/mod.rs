@@ -5,7 +5,10 @@ mod contacts;
 mod fading;
 mod inertia;
 mod loads;
+mod sliders;
 mod spins;
+
+pub use sliders::SliderMotion;
 
 use super::constraints::find_history;
 use super::joints::FoundJoint;
@@ -70,6 +73,8 @@ pub struct Composition {
     pub multipliers: Vec<(SlotKind, String)>,
     /// Components of these that nothing uses
     pub idle_multipliers: Vec<Support>,
+    /// Prescribed sliding
+    pub slider_motions: Vec<SliderMotion>,
     /// Nodes whose rotation a joint takes hold of
     pub jointed: Vec<usize>,
     /// Tables that histories drive, but for motions
@@ -119,6 +124,7 @@ pub fn compose(
         springs: Vec::new(),
         multipliers: Vec::new(),
         idle_multipliers: Vec::new(),
+        slider_motions: Vec::new(),
         jointed: Vec::new(),
         driven: Vec::new(),
         sprung_joints: Vec::new(),
@@ -129,6 +135,7 @@ pub fn compose(
     composer.springs();
     composer.links();
     composer.joints(connections);
+    composer.sliders();
     composer.beam_inertia();
     composer.spin_holds(connections);
     composer.out.bodies = composer.bodies();

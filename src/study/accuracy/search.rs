@@ -304,6 +304,7 @@ impl<'a> Search<'a> {
                 FailureKind::MeshTooCoarse
                 | FailureKind::NotConverged
                 | FailureKind::ContactPassed
+                | FailureKind::SliderEnd
                 | FailureKind::NonFinite
                 | FailureKind::EnergyGrowth
                 | FailureKind::Limit

@@ -22,7 +22,7 @@ pub mod tube;
 pub mod variation;
 
 #[cfg(test)]
-mod dual;
+pub(in crate::kernel) mod dual;
 #[cfg(test)]
 mod tests;
 

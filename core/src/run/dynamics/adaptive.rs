@@ -115,7 +115,7 @@ impl Control {
             };
             let e = change * (factor * length * length);
             let size = match kind {
-                SlotKind::Displacement => e.norm() / model.length,
+                SlotKind::Displacement | SlotKind::Sliding => e.norm() / model.length,
                 SlotKind::Rotation if increments.is_none() => (Rotation::new(end.q[slot]).t * e).norm(),
                 SlotKind::Rotation | SlotKind::Force | SlotKind::Moment => 0.0,
             };

@@ -329,6 +329,7 @@ impl Dynamics<'_, '_> {
         self.refuse_massless_turns()?;
         self.settle_rates(&step);
         self.refuse_turns(step.length)?;
+        self.stage.refuse_departures()?;
         self.stage.refuse_leaps()?;
         self.stage.refuse_passing()?;
         let StageRun { assembly, newton, state, good, .. } = &mut *self.stage;

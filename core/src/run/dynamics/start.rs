@@ -201,7 +201,9 @@ impl Dynamics<'_, '_> {
 fn massless_blocks(system: &System, model: &Model, right_hand_side: &mut [f64]) -> Vec<(Slot, Mat3)> {
     let mut additions = Vec::new();
     let is_massive = threads::list(model.slots(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
-    for slot in (0..model.slots()).filter(|&slot| !(is_massive[slot] || model.kinds[slot].is_multiplier())) {
+    // Sliding follows from the gaps.
+    let moves = |slot: &usize| matches!(model.kinds[*slot], SlotKind::Displacement | SlotKind::Rotation);
+    for slot in (0..model.slots()).filter(moves).filter(|&slot| !is_massive[slot]) {
         let numbers = system.pattern.dof_map.of(slot as Slot);
         let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != DofMap::HELD).collect();
         let (block, weight) = with_mass_where_held(system, slot as Slot);

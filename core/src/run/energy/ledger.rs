@@ -220,7 +220,7 @@ fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3), unwrappe
         return 0.0;
     }
     match kind {
-        SlotKind::Displacement => straight_work(q0, f0, q1, f1),
+        SlotKind::Displacement | SlotKind::Sliding => straight_work(q0, f0, q1, f1),
         SlotKind::Rotation => turning_work(q0, f0, q1, f1, unwrapped),
         SlotKind::Force | SlotKind::Moment => 0.0,
     }

@@ -48,6 +48,7 @@ impl StageRun<'_> {
                 | NewtonFailure::Penetrates { .. }
                 | NewtonFailure::Passes { .. } => true,
                 NewtonFailure::LeapsTooFar { .. }
+                | NewtonFailure::Leaves { .. }
                 | NewtonFailure::TurnsTooFar { .. }
                 | NewtonFailure::NotFinite { .. }
                 | NewtonFailure::StepTooSmall { .. }

@@ -176,6 +176,9 @@ impl LevelControl<'_, '_> {
                     self.take_step(signature)?;
                 }
                 StepOutcome::Jumped(_) => return self.go_around(target, None),
+                StepOutcome::Failed(failure @ NewtonFailure::Leaves { .. }) => {
+                    return Err(self.stage.name_failure(failure, &self.stage.assembly.system));
+                }
                 StepOutcome::Failed(failure) => return self.go_around(target, Some(failure)),
             }
         }

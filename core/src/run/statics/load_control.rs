@@ -41,6 +41,7 @@ impl StageRun<'_> {
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
         let moved = moves.then_some(&prescribed_increment[..]);
         newton.solve(model, assembly, state, &Equilibrium, moved, &mut counters.work)?;
+        self.refuse_departures()?;
         self.refuse_leaps()?;
         self.refuse_windings()
     }

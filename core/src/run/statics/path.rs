@@ -249,7 +249,10 @@ impl Path {
             history.push(residual.ratio);
             NewtonFailure::unless_interrupted()?;
             match verdict {
-                Verdict::Converged | Verdict::Noisy => return Ok(iterations),
+                Verdict::Converged | Verdict::Noisy => {
+                    stage.refuse_departures()?;
+                    return Ok(iterations);
+                }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, stage.state)),
                 Verdict::Continue if iterations == newton.max_iterations => {
                     return Err(NewtonFailure::NotConverged { residual, history });

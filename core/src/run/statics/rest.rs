@@ -224,7 +224,10 @@ impl<'s, 'r> Descent<'s, 'r> {
         state.anchor = Some(Arc::new(Anchor { resistance, q: state.q.clone() }));
         let increment = moves.then_some(&increment[..]);
         let solved = self.newton.solve(model, &mut self.assembly, state, &Equilibrium, increment, &mut counters.work);
-        let solved = solved.and_then(|()| self.stage.refuse_leaps()).and_then(|()| self.stage.refuse_windings());
+        let solved = solved
+            .and_then(|()| self.stage.refuse_departures())
+            .and_then(|()| self.stage.refuse_leaps())
+            .and_then(|()| self.stage.refuse_windings());
         let solved = solved.and_then(|()| self.stage.refuse_passing());
         if solved.is_err() {
             return false;
