@@ -79,7 +79,7 @@ impl Axis {
             let sample = |k: usize| {
                 let part = (k % SAMPLES) as f64 / SAMPLES as f64;
                 let from = z(k / SAMPLES);
-                place(if k % SAMPLES == 0 { from } else { from + part * (z(k / SAMPLES + 1) - from) })
+                place(if k.is_multiple_of(SAMPLES) { from } else { from + part * (z(k / SAMPLES + 1) - from) })
             };
             (0..=SAMPLES * last).map(sample).collect()
         };

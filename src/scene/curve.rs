@@ -187,7 +187,7 @@ fn slopes(points: &[Vec3], chords: &[f64], tangents: Option<[Vec3; 2]>) -> Vec<V
     }
     for k in (0..last).rev() {
         let next = slopes[k + 1];
-        slopes[k] = slopes[k] - next * above[k];
+        slopes[k] -= next * above[k];
     }
     slopes
 }

@@ -227,7 +227,7 @@ fn products_of<const N: usize>(vectors: [&[f64]; N], x: &[f64]) -> [f64; N] {
     let mut sums = [Lanes([0.0; LANES]); N];
     for (k, x) in lanes.iter().enumerate() {
         for (sum, part) in sums.iter_mut().zip(&parts) {
-            *sum = *sum + Lanes(part[k]) * Lanes(*x);
+            *sum += Lanes(part[k]) * Lanes(*x);
         }
     }
     let start = x.len() - rest.len();
