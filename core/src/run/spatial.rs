@@ -17,7 +17,7 @@ impl InSpace {
     fn new(stage: &StageRun) -> Result<Self, Failure> {
         let context = stage.stage().context(stage.number);
         let dof_map = stage.schedule.dof_map(stage.model, None).map_err(|error| stage.describe(error))?;
-        let assembly = Assembly::new(&context, dof_map, stage.model);
+        let assembly = Assembly::about(stage.state, &context, dof_map, stage.model);
         let (solver, system) = (&stage.newton.solver, &stage.assembly.system);
         match LinearSolver::beside(solver, system, &assembly.system, &stage.model.multipliers) {
             Some(solver) => Ok(Self { assembly, solver }),
