@@ -97,7 +97,7 @@ pub struct ContactSurvey {
 pub struct Penetration {
     /// Name of the contact
     pub contact: String,
-    /// Name of the surface
+    /// Name of the surface, or of the other beam
     pub surface: String,
     /// A slot of a node there
     pub slot: Slot,

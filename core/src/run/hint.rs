@@ -37,7 +37,9 @@ impl Failure {
                 "move the surface or the beam apart (the radius of the contact counts), or allow a larger `penetration`"
                     .into(),
             ),
-            Self::ContactPassed { .. } => Some("take more `steps`, or a smaller `step`".into()),
+            Self::ContactPassed { .. } => {
+                Some("take more `steps`, or a smaller `step`; between beams, give the contact a larger `stiffness`".into())
+            }
             Self::MeshTooCoarse { .. } => Some("use more `elements` there".into()),
             Self::EnergyGrowth { at, .. } => {
                 let cures = [has(at)?.damping(), Some("take a smaller `step`".into())];

@@ -27,7 +27,7 @@ impl InSpace {
 }
 
 /// The look out of the plane, which a stage in space does not need. What it takes is set up by the
-/// first look.
+/// first look, and where other beams have come near each other.
 #[derive(Default)]
 pub(super) struct SpatialLook {
     in_space: Option<InSpace>,
@@ -36,7 +36,8 @@ pub(super) struct SpatialLook {
 impl SpatialLook {
     /// The stage in space; `None` where it is treated there anyway.
     pub fn of(&mut self, stage: &StageRun) -> Result<Option<&mut InSpace>, Failure> {
-        if self.in_space.is_none() && stage.plane.is_some() {
+        let is_known = self.in_space.as_ref().is_some_and(|in_space| in_space.assembly.fits(stage.state));
+        if !is_known && stage.plane.is_some() {
             self.in_space = Some(InSpace::new(stage)?);
         }
         Ok(self.in_space.as_mut())

@@ -30,6 +30,9 @@ const OF_EXTENSION: f64 = 1e-4;
 /// Steps that a contact in a dynamic stage lasts, at least.
 const STEPS_OF_CONTACT: f64 = 10.0;
 
+/// Pairs of beams that are named in the reason of contacts, at most.
+const NAMED_MEETINGS: usize = 6;
+
 const NAME: &str = "contact";
 const FRICTION: &str = "friction of contacts";
 
@@ -311,10 +314,14 @@ fn reason_of(tables: usize, out: &SurfaceContacts) -> String {
         parts.push(format!("{elements} pair(s) of an element or a body with a surface"));
     }
     if !out.pairs.is_empty() {
-        parts.push(format!(
-            "{} pair(s) of beams, of which only elements near each other are looked at",
-            out.pairs.len()
-        ));
+        let meets = |[a, b]: [&str; 2]| if a == b { format!("{a} with itself") } else { format!("{a} with {b}") };
+        let mut named: Vec<String> = out.pairs.names().take(NAMED_MEETINGS).map(meets).collect();
+        if out.pairs.len() > NAMED_MEETINGS {
+            named.push(format!("{} more pairs of beams", out.pairs.len() - NAMED_MEETINGS));
+        }
+        let named = named.join(", ");
+        parts
+            .push(format!("{named} (not where they are near each other along a beam, or near a node that they share)"));
     }
     format!("{tables} [[contact]] table(s): {}", parts.join(", "))
 }

@@ -476,9 +476,6 @@ impl Effect for SurfaceContacts {
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
-        if !self.pairs.is_empty() {
-            show(MirrorData::Spatial);
-        }
         for chain in &self.chains {
             self.surfaces[chain.surface].mirror_data(chain.nodes[0].place, show);
             chain.nodes.iter().filter(|_| chain.beam.is_none()).for_each(|node| show(MirrorData::Place(node.place)));

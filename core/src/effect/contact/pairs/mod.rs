@@ -97,6 +97,11 @@ impl BeamPairs {
         self.meetings.len()
     }
 
+    /// The names of both beams of each meeting.
+    pub fn names(&self) -> impl Iterator<Item = [&str; 2]> {
+        self.meetings.iter().map(|meeting| meeting.strands.map(|strand| self.names[strand].as_str()))
+    }
+
     /// The contact that a meeting belongs to.
     fn contact_of(&self, meeting: usize) -> usize {
         self.strands[self.meetings[meeting].strands[0]].contact
