@@ -14,6 +14,9 @@ use crate::rotation::Rotation;
 use crate::system::{ContactRegime, ListedPair, PairPointKind, PairPointMemory, PointMemory, State};
 use crate::tensor::{Mat3, Vec3};
 
+/// Closest points nearer to each other than this part of an element, on both beams, are one contact.
+const SAME_PLACE: f64 = 0.9;
+
 /// A contact point of two beams in a state.
 pub(super) struct PairPoint<'a> {
     /// Number of the pair in the list
@@ -99,6 +102,9 @@ impl<'a> PairsNow<'a> {
                 let candidates = self.candidates(pair, blend);
                 found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
             }
+        }
+        if self.at.contacts.regime == ContactRegime::Penalty {
+            self.keep_nearest(&mut found);
         }
         let partners = self.matched(&found, memory.1);
         let orders = self.pairs.both(group[0].meeting as usize).map(|strand| strand.order);
@@ -196,6 +202,36 @@ impl<'a> PairsNow<'a> {
     fn distance<const NA: usize, const NB: usize>(&self, pair: &ListedPair, [s, e]: [f64; 2]) -> f64 {
         let [a, b] = self.pairs.elements_of(pair);
         (self.side::<NA>(a).place(s) - self.side::<NB>(b).place(e)).norm()
+    }
+
+    /// Of closest points near each other on both beams, as at the inside of a kink, keeps the one with
+    /// the smallest gap: two penalties would jump to one where the points merge.
+    fn keep_nearest(&self, found: &mut Vec<Found>) {
+        let along = |found: &Found| {
+            let pair = &self.list[found.number];
+            [0, 1].map(|side| f64::from(pair.elements[side]) + found.candidate.at[side])
+        };
+        let distance = |found: &Found| {
+            let pair = &self.list[found.number];
+            let orders = self.pairs.both(pair.meeting as usize).map(|strand| strand.order);
+            of_orders!(orders, self.distance(pair, found.candidate.at))
+        };
+        let closest = |found: &&Found| found.candidate.kind == PairPointKind::Closest;
+        let all: Vec<([f64; 2], f64)> =
+            found.iter().filter(closest).map(|found| (along(found), distance(found))).collect();
+        let is_beaten = |own: usize| {
+            let (place, gap) = all[own];
+            all.iter().enumerate().any(|(other, (at, less))| {
+                let is_near = place.iter().zip(at).all(|(a, b)| (a - b).abs() < SAME_PLACE);
+                is_near && (*less < gap || (*less == gap && other < own))
+            })
+        };
+        let mut number = 0;
+        found.retain(|found| {
+            let is_closest = found.candidate.kind == PairPointKind::Closest;
+            number += usize::from(is_closest);
+            !(is_closest && is_beaten(number - 1))
+        });
     }
 
     /// True if a point continues one in memory.
