@@ -54,7 +54,7 @@ failure_kinds! {
     Singular: "singular", Numerics;
     /// A beam or a body penetrates a surface where its contact begins to act.
     ContactStart: "contact_start", Deck;
-    /// A beam or a body may have passed through a surface.
+    /// A beam or a body may have passed through a surface, or through a beam.
     ContactPassed: "contact_passed", Numerics;
     /// A node has slid to the end of the beam on which it slides.
     SliderEnd: "slider_end", Numerics;

@@ -1,4 +1,4 @@
-//! `[[contact]]`: beams and bodies that touch surfaces.
+//! `[[contact]]`: beams and bodies that touch surfaces, beams that touch each other.
 
 use super::diagnostic::{Span, Spanned};
 use super::point::check_name;
@@ -18,6 +18,10 @@ pub struct Contact {
     pub nodes: Vec<Spanned<String>>,
     /// The surfaces
     pub surfaces: Vec<Spanned<String>>,
+    /// Beams that the beams may touch
+    pub with: Vec<Spanned<String>>,
+    /// True if each beam may touch itself
+    pub touches_itself: bool,
     /// The radius
     pub radius: ContactRadius,
     /// Coefficients of friction at the start and at the end of beams
@@ -95,11 +99,7 @@ pub(super) const KEYS: [&str; 17] = [
 ];
 
 /// Keys that the contract of decks has, and this version cannot do yet.
-const LATER: [(&str, &str); 3] = [
-    ("with", "contact of beams with beams is not available: a contact takes `surfaces`"),
-    ("self", "contact of a beam with itself is not available: a contact takes `surfaces`"),
-    ("start", "`start` is not available: place beams and surfaces without penetration"),
-];
+const LATER: [(&str, &str); 1] = [("start", "`start` is not available: place beams and surfaces without penetration")];
 
 pub(super) fn read_contact<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Contact> {
     let table = Table::new(context, item, "[[contact]]", &KEYS)?;
@@ -111,7 +111,9 @@ pub(super) fn read_contact<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
     let name = table.required_text("name").and_then(|name| check_name(context, name));
     let beams = table.optional("beams", |context, item| context.texts(item));
     let nodes = table.optional("nodes", |context, item| context.texts(item));
-    let surfaces = table.required("surfaces").and_then(|item| context.texts(item));
+    let surfaces = table.optional("surfaces", |context, item| context.texts(item));
+    let with = table.optional("with", |context, item| context.texts(item));
+    let touches_itself = table.flag_or("self", false);
     let radius = read_radius(&table);
     let friction = table.optional("friction", read_friction);
     let penetration = table.optional("penetration", |_, _| table.positive("penetration"));
@@ -124,7 +126,9 @@ pub(super) fn read_contact<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
         name: name?,
         beams: beams?.unwrap_or_default(),
         nodes: nodes?.unwrap_or_default(),
-        surfaces: surfaces?,
+        surfaces: surfaces?.unwrap_or_default(),
+        with: with?.unwrap_or_default(),
+        touches_itself: touches_itself?,
         radius: radius?,
         friction: friction?.unwrap_or([0.0; 2]),
         penetration: penetration?.map(|number| number.value),
@@ -135,18 +139,44 @@ pub(super) fn read_contact<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
         stages: stages?,
         span: table.span.clone(),
     };
-    for (key, names) in [("beams", &contact.beams), ("nodes", &contact.nodes), ("surfaces", &contact.surfaces)] {
+    check_parties(&table, contact)
+}
+
+/// Refuses contacts without two parties, and names that are given twice.
+fn check_parties(table: &Table, contact: Contact) -> Option<Contact> {
+    let lists = [
+        ("beams", &contact.beams),
+        ("nodes", &contact.nodes),
+        ("surfaces", &contact.surfaces),
+        ("with", &contact.with),
+    ];
+    for (key, names) in lists {
         let is_again = |k: usize| names[..k].iter().any(|other| other.value == names[k].value);
         if let Some(twice) = (0..names.len()).find(|&k| is_again(k)).map(|k| &names[k]) {
             let message = format!("`{key}` names `{}` twice: its contact would count double", twice.value);
-            return context.wrong(twice.span.clone(), message);
+            return table.context.wrong(twice.span.clone(), message);
         }
     }
     if contact.beams.is_empty() && contact.nodes.is_empty() {
         return table.wrong("[[contact]] needs `beams` or `nodes`");
     }
-    if contact.surfaces.is_empty() {
-        return table.wrong_key("surfaces", "`surfaces` must name at least one [[surface]]");
+    let meets_beams = !contact.with.is_empty() || contact.touches_itself;
+    if contact.surfaces.is_empty() && !meets_beams {
+        return table.wrong("[[contact]] needs `surfaces`, `with` (other beams) or `self = true`");
+    }
+    let both = contact.with.iter().find(|name| contact.beams.iter().any(|beam| beam.value == name.value));
+    if let Some(both) = both {
+        let message = format!("`{}` is in `beams` and in `with`: a beam touches itself by `self = true`", both.value);
+        return table.context.wrong(both.span.clone(), message);
+    }
+    if meets_beams && !contact.nodes.is_empty() {
+        let message = "`with` and `self` are for beams alone: give `nodes` a contact of their own, with `surfaces`";
+        return table.wrong_key("nodes", message);
+    }
+    if meets_beams && contact.friction != [0.0; 2] {
+        let message = "friction between beams is not available: take `friction` out, or give beams and surfaces a \
+                       contact of their own";
+        return table.wrong_key("friction", message);
     }
     Some(contact)
 }

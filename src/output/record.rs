@@ -224,6 +224,10 @@ struct ContactRecord {
     augmentations: u64,
     softenings: u64,
     changes: u64,
+    #[serde(default)]
+    stiffenings: u64,
+    #[serde(default)]
+    lists: u64,
 }
 
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -623,8 +627,14 @@ fn failure_of(failure: &Failure, scene: &Scene) -> Option<Value> {
 }
 
 fn contact_record(contacts: &ContactCounters) -> Option<ContactRecord> {
-    let ContactCounters { augmentations, softenings, changes } = *contacts;
-    (*contacts != ContactCounters::default()).then_some(ContactRecord { augmentations, softenings, changes })
+    let ContactCounters { augmentations, softenings, changes, stiffenings, lists } = *contacts;
+    (*contacts != ContactCounters::default()).then_some(ContactRecord {
+        augmentations,
+        softenings,
+        changes,
+        stiffenings,
+        lists,
+    })
 }
 
 fn moment_of(failure: &Failure) -> Option<&Moment> {

@@ -107,7 +107,7 @@ impl Columns<'_> {
         let probe = self.node_probe(name, own).ok()?;
         let Reading::BeamPoint(point, _) = &probe.reading else { return None };
         let beam = &self.mesh.beams[point.beam].name;
-        let touches = |contact: &Contact| contact.beams.iter().any(|name| name.value == *beam);
+        let touches = |contact: &Contact| contact.beams.iter().chain(&contact.with).any(|name| name.value == *beam);
         self.deck.contacts.iter().any(touches).then_some(probe)
     }
 

@@ -147,5 +147,5 @@ fn minimal_decks_hold() {
 
 #[test]
 fn contacts_hold() {
-    all_hold("decks/contact", 5);
+    all_hold("decks/contact", 9);
 }

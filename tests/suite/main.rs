@@ -2,6 +2,8 @@
 
 mod assembled;
 mod bad_decks;
+mod beam_contacts;
+
 mod buckling;
 mod builder;
 mod coefficients;

@@ -31,6 +31,17 @@ pub trait Contacts {
     /// force, if it is larger than allowed.
     fn hidden_penetration(&self, at: &State) -> Option<Penetration>;
 
+    /// Lists the pairs of beam elements that are near each other, unless a state has such a list.
+    fn list_pairs(&self, at: &mut State);
+
+    /// Adds to the list of `from` the pairs of beam elements that may have met on the way to another
+    /// state without being listed.
+    fn list_missed(&self, from: &mut State, to: &State) -> MissedPairs;
+
+    /// The part of an increment of the unknowns, up to 1, on which the centre lines of beams stay
+    /// apart.
+    fn safe_part(&self, at: &State, increment: &[Vec3]) -> f64;
+
     /// A slot of a node that may have passed through a surface on the way from one state to another.
     fn passed(&self, from: &State, to: &State) -> Option<Slot>;
 
@@ -43,6 +54,17 @@ pub trait Contacts {
     /// Normal force and friction per length, in an accepted state, on a beam at a part of its
     /// length.
     fn force_along(&self, beam: usize, fraction: f64, at: &State) -> [f64; 2];
+}
+
+/// The outcome of a look for pairs of beam elements that a step did not see.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MissedPairs {
+    /// None are missing: the step holds.
+    None,
+    /// Some were missing, and are listed now: the step is to be taken again.
+    Listed(Slot),
+    /// More are missing than can be listed: the step is too long.
+    TooMany(Slot),
 }
 
 /// A change of contacts in a step.
@@ -75,7 +97,7 @@ pub struct ContactSurvey {
 pub struct Penetration {
     /// Name of the contact
     pub contact: String,
-    /// Name of the surface
+    /// Name of the surface, or of the other beam
     pub surface: String,
     /// A slot of a node there
     pub slot: Slot,

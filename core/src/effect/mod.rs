@@ -19,12 +19,14 @@ pub mod spring;
 mod volume;
 
 pub use batch::{ByOrder, Connection};
-pub use contact_role::{ContactChange, ContactResultant, ContactSurvey, Contacts, Penetration};
+pub use contact_role::{ContactChange, ContactResultant, ContactSurvey, Contacts, MissedPairs, Penetration};
 pub use volume::{VolumeElement, VolumeElements};
 
 use crate::kernel::Weights;
 use crate::kernel::inertia::Inertia;
-use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Plane, Slot, StageContext, State};
+use crate::system::{
+    Assembler, Category, Connectivity, ListedPair, Memory, MirrorData, Node, Plane, Slot, StageContext, State,
+};
 use crate::tensor::Vec3;
 use batch::{
     ELEMENTS_PER_TASK, after_displacement, at_slots, for_each_batch, motion_of, motions, one_by_one, own_blocks,
@@ -139,6 +141,11 @@ pub trait Effect: Send + Sync {
     /// The slots of each instance; [divisible](Connectivity::divisible) if instances may be
     /// assembled in parallel.
     fn connectivity(&self) -> Connectivity;
+
+    /// The slots of each instance where pairs of beam elements are near each other.
+    fn connectivity_with(&self, _pairs: &[ListedPair]) -> Connectivity {
+        self.connectivity()
+    }
 
     /// The form of its tangent. A general one makes the whole tangent unsymmetric, with twice the
     /// cost of factorisation.

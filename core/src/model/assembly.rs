@@ -6,8 +6,8 @@ use crate::effect::{Effect, PlanarForm, RoundOff, TangentForm};
 use crate::interrupt;
 use crate::kernel::Weights;
 use crate::system::{
-    Assembler, Category, Connectivity, DofMap, FrameConflict, Memory, Pattern, Plane, State, Symmetry, System,
-    SystemSlice,
+    Assembler, Category, Connectivity, DofMap, FrameConflict, ListedPair, Memory, Pattern, Plane, State, Symmetry,
+    System, SystemSlice,
 };
 use crate::tensor::{Vec3, zeros};
 use crate::threads;
@@ -24,6 +24,8 @@ pub struct Assembly {
     pub(crate) evaluations: Vec<(&'static str, u64)>,
     /// The matrices of a linear stage; `None` in other stages
     linear: Option<Box<LinearisedSystem>>,
+    /// The pairs of beam elements in the pattern
+    pairs: Arc<Vec<ListedPair>>,
 }
 
 /// An effect in a stage.
@@ -37,9 +39,9 @@ struct Acting {
 }
 
 impl Acting {
-    fn new(effect: Arc<dyn Effect>, plane: Option<&Plane>, instances: usize) -> Self {
+    fn new(effect: Arc<dyn Effect>, plane: Option<&Plane>, instances: usize, pairs: &Arc<Vec<ListedPair>>) -> Self {
         let points = effect.roles().stresses.map_or(0, |stresses| stresses.memory_points());
-        let memory = Memory { points: vec![[0.0; 6]; points], valid: false };
+        let memory = Memory { points: vec![[0.0; 6]; points], valid: false, pairs: pairs.clone() };
         let planar = plane.and_then(|plane| effect.clone().in_plane(plane));
         Self { has_tangent: effect.tangent().exists(), effect, planar, memory, instances: instances as u64 }
     }
@@ -101,15 +103,30 @@ fn add_rates(effects: &[Acting], state: &State, part: &mut SystemSlice) {
 }
 
 impl Assembly {
-    /// The assembly of all effects that act in a stage, on the degrees of freedom `dof_map`.
+    /// The assembly of all effects that act in a stage, on the degrees of freedom `dof_map`, where no
+    /// beams are near each other.
     pub fn new(stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
-        Self::of(model.acting(stage), stage, dof_map, model)
+        Self::of(model.acting(stage), stage, dof_map, model, Arc::default())
     }
 
-    /// The assembly of chosen effects in a stage, on the degrees of freedom `dof_map`.
-    pub fn of(acting: Vec<Arc<dyn Effect>>, stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
-        let connectivity = threads::map(acting.iter(), |effect| effect.connectivity());
-        let acts = |(effect, own): (Arc<dyn Effect>, &Connectivity)| Acting::new(effect, dof_map.plane(), own.len());
+    /// The assembly of all effects that act in a stage, on the degrees of freedom `dof_map`, with the
+    /// pairs of beam elements that are near each other in a state.
+    pub fn about(at: &State, stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
+        Self::of(model.acting(stage), stage, dof_map, model, at.contacts.pairs.list.clone())
+    }
+
+    /// The assembly of chosen effects in a stage, on the degrees of freedom `dof_map`, with pairs of
+    /// beam elements near each other.
+    pub fn of(
+        acting: Vec<Arc<dyn Effect>>,
+        stage: &StageContext,
+        dof_map: DofMap,
+        model: &Model,
+        pairs: Arc<Vec<ListedPair>>,
+    ) -> Self {
+        let connectivity = threads::map(acting.iter(), |effect| effect.connectivity_with(&pairs));
+        let plane = dof_map.plane();
+        let acts = |(effect, own): (Arc<dyn Effect>, &Connectivity)| Acting::new(effect, plane, own.len(), &pairs);
         let effects: Vec<Acting> = acting.into_iter().zip(&connectivity).map(acts).collect();
         // Linear stages add forces of all categories at any slot.
         let everywhere: &[Category] = if model.is_linear(stage.kind) { &Category::ALL } else { &[] };
@@ -127,7 +144,21 @@ impl Assembly {
             ),
             effects,
             linear: None,
+            pairs,
         }
+    }
+
+    /// True if its pattern is that of the pairs of beam elements that are near each other in a state.
+    pub fn fits(&self, at: &State) -> bool {
+        let list = &at.contacts.pairs.list;
+        Arc::ptr_eq(&self.pairs, list) || self.pairs == *list
+    }
+
+    /// Takes the forces of the present state, and what was counted, over from the assembly of other
+    /// pairs.
+    pub fn take_over(&mut self, other: Self) {
+        self.evaluations = other.evaluations;
+        self.system.force = other.system.force;
     }
 
     /// Makes the stage linear: forces and tangent are from now on linearised about a state.

@@ -112,7 +112,7 @@ pub enum Failure {
         at: Moment,
         /// The contact
         contact: String,
-        /// The surface
+        /// The surface, or the other beam
         surface: String,
         /// The node
         node: String,
@@ -309,13 +309,13 @@ impl fmt::Display for Failure {
             ),
             Self::ContactStart { at, contact, surface, node, depth } => write!(
                 f,
-                "contact \"{contact}\" begins with a penetration: node \"{node}\" is {depth:.3e} inside surface \
+                "contact \"{contact}\" begins with a penetration: node \"{node}\" is {depth:.3e} inside \
                  \"{surface}\" ({at})"
             ),
             Self::ContactPassed { at, node } => write!(
                 f,
-                "node \"{node}\" may have passed through a surface: in one step it moves by more than the depth of the \
-                 surface ({at})"
+                "node \"{node}\" may have passed through a surface or a beam: in one step it moves by more than the \
+                 depth of the surface, or a contact of beams is too soft to keep them apart ({at})"
             ),
             Self::SliderEnd { at, node } => {
                 write!(f, "node \"{node}\" slides beyond the end of the beam on which it slides ({at})")

@@ -40,7 +40,9 @@ impl Failure {
             Self::SliderEnd { .. } => Some(
                 "end the stage before (`until`), make the beam longer, or stop the node by a spring".into(),
             ),
-            Self::ContactPassed { .. } => Some("take more `steps`, or a smaller `step`".into()),
+            Self::ContactPassed { .. } => {
+                Some("take more `steps`, or a smaller `step`; between beams, give the contact a larger `stiffness`".into())
+            }
             Self::MeshTooCoarse { .. } => Some("use more `elements` there".into()),
             Self::EnergyGrowth { at, .. } => {
                 let cures = [has(at)?.damping(), Some("take a smaller `step`".into())];

@@ -117,7 +117,10 @@ impl<'o> Run<'o> {
     fn stage_run(&mut self, number: usize, dof_map: DofMap, fresh: bool) -> Result<StageRun<'_>, Failure> {
         let stage = &self.plan.stages[number];
         let plane = dof_map.plane().copied();
-        let assembly = Assembly::new(&stage.context(number), dof_map, &self.model);
+        if let Some(contacts) = self.model.contacts() {
+            contacts.list_pairs(&mut self.run.state);
+        }
+        let assembly = Assembly::about(&self.run.state, &stage.context(number), dof_map, &self.model);
         let at = self.moment_in(number);
         let newton = newton_for(stage, &assembly, &self.model, at)?;
         let RunState { schedule, state, good, counters, issued, bookkeeper, past } = &mut self.run;

@@ -66,6 +66,10 @@ pub struct ContactCounters {
     pub softenings: u64,
     /// Levels and steps in which contacts have come or gone, or begun to slide or to stick
     pub changes: u64,
+    /// Levels that were tried again with a stiffer contact, since beams would have crossed
+    pub stiffenings: u64,
+    /// Lists of beam elements near each other for which the tangent was set up anew
+    pub lists: u64,
 }
 
 /// Names of a checkpoint, which live as long as the program: a handful each time a run is resumed.

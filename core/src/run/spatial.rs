@@ -17,7 +17,7 @@ impl InSpace {
     fn new(stage: &StageRun) -> Result<Self, Failure> {
         let context = stage.stage().context(stage.number);
         let dof_map = stage.schedule.dof_map(stage.model, None).map_err(|error| stage.describe(error))?;
-        let assembly = Assembly::new(&context, dof_map, stage.model);
+        let assembly = Assembly::about(stage.state, &context, dof_map, stage.model);
         let (solver, system) = (&stage.newton.solver, &stage.assembly.system);
         match LinearSolver::beside(solver, system, &assembly.system, &stage.model.multipliers) {
             Some(solver) => Ok(Self { assembly, solver }),
@@ -27,7 +27,7 @@ impl InSpace {
 }
 
 /// The look out of the plane, which a stage in space does not need. What it takes is set up by the
-/// first look.
+/// first look, and where other beams have come near each other.
 #[derive(Default)]
 pub(super) struct SpatialLook {
     in_space: Option<InSpace>,
@@ -36,7 +36,8 @@ pub(super) struct SpatialLook {
 impl SpatialLook {
     /// The stage in space; `None` where it is treated there anyway.
     pub fn of(&mut self, stage: &StageRun) -> Result<Option<&mut InSpace>, Failure> {
-        if self.in_space.is_none() && stage.plane.is_some() {
+        let is_known = self.in_space.as_ref().is_some_and(|in_space| in_space.assembly.fits(stage.state));
+        if !is_known && stage.plane.is_some() {
             self.in_space = Some(InSpace::new(stage)?);
         }
         Ok(self.in_space.as_mut())

@@ -10,7 +10,7 @@ use super::observer::Observer;
 use super::plan::{Plan, Stage};
 use super::results::StageResult;
 use super::snapshot::{Counters, Snapshot};
-use crate::effect::{ContactChange, Penetration};
+use crate::effect::{ContactChange, MissedPairs, Penetration};
 use crate::interrupt;
 use crate::model::{Assembly, Charted, Model, Motion, Schedule, StageError, Timeline, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure};
@@ -191,6 +191,27 @@ impl StageRun<'_> {
         self.flatten();
         self.wind()?;
         self.remember();
+        self.fit_assembly()
+    }
+
+    /// Assembles anew where other beams are near each other in the present state than in the pattern
+    /// of the tangent.
+    pub fn fit_assembly(&mut self) -> Result<(), Failure> {
+        if self.assembly.fits(self.state) {
+            return Ok(());
+        }
+        let dof_map = self.schedule.dof_map(self.model, self.plane).map_err(|error| self.describe(error))?;
+        let assembly = Assembly::about(self.state, &self.stage().context(self.number), dof_map, self.model);
+        let mut newton = newton_for(self.stage(), &assembly, self.model, self.moment())?;
+        newton.recall(self.newton.memory(), self.model, &assembly.system);
+        newton.first = std::mem::take(&mut self.newton.first);
+        newton.contraction = self.newton.contraction;
+        let solver = self.newton.solver.name();
+        self.note_solver(solver);
+        self.newton = newton;
+        let old = std::mem::replace(&mut self.assembly, assembly);
+        self.assembly.take_over(old);
+        self.counters.contacts.lists += 1;
         Ok(())
     }
 
@@ -228,6 +249,8 @@ impl StageRun<'_> {
     pub fn go_back_to(&mut self, state: &State) {
         self.state.copy_from(state);
         self.good.copy_from(state);
+        // A failure for want of memory shows in the next attempt.
+        self.fit_assembly().unwrap_or_default();
     }
 
     /// Shows a row to the observer.
@@ -352,6 +375,28 @@ impl StageRun<'_> {
             Some(slot) => Err(NewtonFailure::Passes { slot: slot as usize }),
             None => Ok(()),
         }
+    }
+
+    /// Pairs of beams that were not looked at may have met between the last good state and this one:
+    /// with them the step is taken again.
+    pub fn refuse_missed(&mut self) -> Result<(), NewtonFailure> {
+        let Some(contacts) = self.model.contacts() else { return Ok(()) };
+        match contacts.list_missed(self.good, self.state) {
+            MissedPairs::None => Ok(()),
+            MissedPairs::Listed(slot) | MissedPairs::TooMany(slot) => {
+                Err(NewtonFailure::Passes { slot: slot as usize })
+            }
+        }
+    }
+
+    /// Goes back to the last good state. True if more pairs of beams are listed there now, with
+    /// which the step may succeed.
+    pub fn looks_at_more(&mut self) -> bool {
+        if self.assembly.fits(self.good) {
+            return false;
+        }
+        self.state.copy_from(self.good);
+        self.fit_assembly().is_ok()
     }
 
     /// Between the last good state and this one neighbours may have turned past pi against each

@@ -88,7 +88,7 @@ impl StageRun<'_> {
         let Some(Penetration { contact, surface, depth, .. }) = contacts.hidden_penetration(self.state) else { return };
         let stage = self.number + 1;
         let message = format!(
-            "stage {stage} ends with a penetration of {depth:.3e} of contact \"{contact}\" into surface \"{surface}\", \
+            "stage {stage} ends with a penetration of {depth:.3e} of contact \"{contact}\" into \"{surface}\", \
              between the points that carry forces: use more elements there"
         );
         self.warn(WarningKind::HiddenPenetration, message);

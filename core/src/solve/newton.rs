@@ -19,6 +19,7 @@ use crate::scalar::CompressedField;
 use crate::system::{State, System};
 use crate::tensor::{Vec3, zeros};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// Newton's iteration with its linear solver and buffers, kept between solutions.
 pub struct Newton {
@@ -38,6 +39,11 @@ pub struct Newton {
     /// Largest ratio of successive corrections of the last solution, above round-off; small if the
     /// iteration follows the path
     pub(crate) contraction: f64,
+    /// True if a correction of the last solution was shortened, so that centre lines of beams do not
+    /// cross
+    pub(crate) was_shortened: bool,
+    /// True if the last correction was
+    is_short: bool,
     reuse: Reuse,
     stress_predictor: StressPredictor,
     /// Error estimator of time steps, in adaptive dynamics
@@ -75,6 +81,8 @@ impl Newton {
             last: None,
             first: CompressedField::default(),
             contraction: 0.0,
+            was_shortened: false,
+            is_short: false,
             reuse: Reuse::new(),
             stress_predictor: StressPredictor::default(),
             time_error: None,
@@ -155,7 +163,7 @@ impl Newton {
             state,
             method,
             work,
-            prescribed_increment,
+            prescribed_increment: prescribed_increment.map(Cow::Borrowed),
             round_off,
             iterations: 0,
             refinement: Refinement::default(),
@@ -185,8 +193,8 @@ struct Solution<'s> {
     state: &'s mut State,
     method: &'s dyn Method,
     work: &'s mut Work,
-    /// Increments of held directions for the first correction (by slot, global components)
-    prescribed_increment: Option<&'s [Vec3]>,
+    /// Increments of held directions for the next correction (by slot, global components)
+    prescribed_increment: Option<Cow<'s, [Vec3]>>,
     round_off: RoundOff,
     /// Number of corrections so far
     iterations: usize,
@@ -209,6 +217,7 @@ impl Solution<'_> {
         let newton = &mut *self.newton;
         newton.last = None;
         newton.contraction = 0.0;
+        newton.was_shortened = false;
         newton.first.clear();
         newton.reuse.begin(newton.given.take() == Some(self.assembly.system.revision));
     }
@@ -244,7 +253,7 @@ impl Solution<'_> {
             stress_predictor.foresee(self.assembly, self.state, dq);
         }
         let seconds = &mut self.work.evaluation_seconds;
-        timed(seconds, || self.assembly.evaluate(self.state, weights, self.prescribed_increment));
+        timed(seconds, || self.assembly.evaluate(self.state, weights, self.prescribed_increment.as_deref()));
         let judgement = convergence.judge(self.model, &self.assembly.system, self.round_off, *last);
         reuse.look(judgement.residual.ratio, judgement.verdict == Verdict::Noisy);
         judgement
@@ -310,12 +319,13 @@ impl Solution<'_> {
         // The residual of the linear solve is negligible beside the error of an older tangent.
         let looks = self.newton.reuse.is_own();
         let prescribed_increment = self.prescribed_increment.take();
-        let is_solved = self.substitute(prescribed_increment, looks);
+        let is_solved = self.substitute(prescribed_increment.as_deref(), looks);
         NewtonFailure::unless_interrupted()?;
         if !is_solved {
             return Err(NewtonFailure::Singular(self.mechanism()));
         }
         self.iterations += 1;
+        self.shorten(prescribed_increment);
         let length = size(self.model, &self.newton.dq);
         if length > DIVERGED_CORRECTION {
             // Round-off may look like stiffness where there is none.
@@ -325,6 +335,21 @@ impl Solution<'_> {
             });
         }
         Ok(length)
+    }
+
+    /// Shortens a correction on which centre lines of beams would cross. The rest of the increments
+    /// of held directions is left to the next one.
+    fn shorten(&mut self, prescribed_increment: Option<Cow<'_, [Vec3]>>) {
+        let Newton { dq, was_shortened, is_short, .. } = &mut *self.newton;
+        let part = self.model.contacts().map_or(1.0, |contacts| contacts.safe_part(self.state, dq));
+        *is_short = part < 1.0;
+        if !*is_short {
+            return;
+        }
+        *was_shortened = true;
+        dq.iter_mut().for_each(|dq| *dq = *dq * part);
+        let rest = |given: Cow<'_, [Vec3]>| given.iter().map(|&given| given * (1.0 - part)).collect();
+        self.prescribed_increment = prescribed_increment.map(rest).map(Cow::Owned);
     }
 
     /// Prepares the prediction of stress for the next tangent. If equilibrium is expected, the
@@ -349,9 +374,11 @@ impl Solution<'_> {
             newton.first.take(newton.dq.len(), |slot| newton.dq[slot].0);
         }
         self.add();
-        // In a new chart the last correction has no meaning: it must not end the iteration.
+        // In a new chart the last correction has no meaning: it must not end the iteration, and no
+        // more may one that was shortened.
         let switched = changes_charts && self.change_charts();
-        self.newton.last = Some(if switched { f64::INFINITY } else { length });
+        let is_none = switched || self.newton.is_short;
+        self.newton.last = Some(if is_none { f64::INFINITY } else { length });
     }
 
     /// Called when a solution is found.

@@ -20,11 +20,8 @@ pub enum ContactRegime {
 pub struct ContactMemory {
     /// The law of normal forces
     pub regime: ContactRegime,
-    /// Factor on the first stiffness of contacts with which the present load level began: that of
-    /// elastic stick
+    /// Factor on the first stiffness of contacts with which a load level begins
     pub first_factor: f64,
-    /// Factor on the first stiffness with which the next load level begins
-    pub next_factor: f64,
     /// Present factor on the first stiffness of contacts
     pub factor: f64,
     /// True if points that slid go on sliding in the first tangent of a level
@@ -40,6 +37,8 @@ pub struct ContactMemory {
     pub shortest: Option<u32>,
     /// Contacts of each chain: a beam or a body against a surface
     pub chains: Arc<Vec<ChainMemory>>,
+    /// Pairs of beam elements, and their contacts
+    pub pairs: PairsMemory,
 }
 
 impl Default for ContactMemory {
@@ -47,7 +46,6 @@ impl Default for ContactMemory {
         Self {
             regime: ContactRegime::Augmented,
             first_factor: 1.0,
-            next_factor: 1.0,
             factor: 1.0,
             goes_on: true,
             dissipated: 0.0,
@@ -55,6 +53,7 @@ impl Default for ContactMemory {
             deepest: 0.0,
             shortest: None,
             chains: Arc::default(),
+            pairs: PairsMemory::default(),
         }
     }
 }
@@ -62,7 +61,7 @@ impl Default for ContactMemory {
 impl ContactMemory {
     /// True if some point has a force.
     pub fn touches(&self) -> bool {
-        self.chains.iter().any(|chain| !chain.points.is_empty())
+        !self.pairs.points.is_empty() || self.chains.iter().any(|chain| !chain.points.is_empty())
     }
 }
 
@@ -104,4 +103,57 @@ pub struct PointMemory {
     pub push: Vec3,
     /// The place where bodies touch (global components)
     pub at: Vec3,
+}
+
+/// Pairs of beam elements near each other, and their contacts.
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+pub struct PairsMemory {
+    /// The pairs that are looked at, in their order
+    pub list: Arc<Vec<ListedPair>>,
+    /// The part of the force of each pair that closest points of both elements carry; nodes carry
+    /// the rest. Constant in a step.
+    pub blend: Arc<Vec<f64>>,
+    /// Places of the nodes of all beams when the list was made; empty before the first list
+    pub places: Arc<Vec<Vec3>>,
+    /// The gap up to which pairs are in the list, a length
+    pub margin: f64,
+    /// Points with a force, in the order of their meetings and places
+    pub points: Arc<Vec<PairPointMemory>>,
+}
+
+/// Two beam elements near each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
+pub struct ListedPair {
+    /// Number of the meeting: two beams, or one that meets itself
+    pub meeting: u32,
+    /// Numbers of the elements, each in its beam
+    pub elements: [u32; 2],
+}
+
+/// The kind of a contact point of two beams.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+pub enum PairPointKind {
+    /// The closest points of both beams
+    Closest,
+    /// A node of the first beam and its closest point on the second
+    NodeOfFirst,
+    /// A node of the second beam and its closest point on the first
+    NodeOfSecond,
+}
+
+/// A contact point of two beams with a force.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct PairPointMemory {
+    /// Number of the meeting
+    pub meeting: u32,
+    /// Its kind
+    pub kind: PairPointKind,
+    /// Its place on the second beam: the number of its element plus the part of that element before
+    /// it
+    pub on_second: f64,
+    /// The part of the force that it carries
+    pub weight: f64,
+    /// Its place on the first beam, its force without the weight, and the push on the first beam
+    /// with it
+    pub point: PointMemory,
 }

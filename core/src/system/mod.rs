@@ -23,7 +23,9 @@ pub use assembler::{Assembler, SystemSlice};
 pub use assembly::{Matrix, ResidualBuffer, System};
 pub use category::Category;
 pub use connectivity::Connectivity;
-pub use contact::{ChainMemory, ContactMemory, ContactRegime, PointMemory};
+pub use contact::{
+    ChainMemory, ContactMemory, ContactRegime, ListedPair, PairPointKind, PairPointMemory, PairsMemory, PointMemory,
+};
 pub use dof_map::{Direction, DofMap, FrameConflict};
 pub use field::Field;
 pub use node_blocks::{Layout, NodeBlocks};

@@ -1,6 +1,6 @@
 //! State of a scene: a 3-vector of unknowns per slot, with its rates.
 
-use super::contact::ContactMemory;
+use super::contact::{ContactMemory, ListedPair};
 use super::field::Field;
 use crate::kernel::NodeMotion;
 use crate::kernel::inertia::Spin;
@@ -287,12 +287,14 @@ impl RotationRate {
     }
 }
 
-/// Stresses that one effect remembers during a Newton iteration, six numbers per integration point.
-/// They can be dropped at any time.
+/// What an assembly keeps for one effect: stresses that it remembers during a Newton iteration, six
+/// numbers per integration point, which can be dropped at any time, and the pairs of its pattern.
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
     /// Remembered stresses, meaningful only while `valid`
     pub points: Vec<[f64; 6]>,
     /// True if `points` belongs to the current iteration.
     pub valid: bool,
+    /// The pairs of beam elements that the pattern of the assembly has room for
+    pub pairs: Arc<Vec<ListedPair>>,
 }

@@ -1,4 +1,4 @@
-//! Contacts of beams and bodies with surfaces.
+//! Contacts of beams and bodies with surfaces, and of beams with beams.
 
 use super::{Composer, stage_set};
 use crate::deck::{
@@ -9,7 +9,8 @@ use crate::scene::mesh::MeshBeam;
 use crate::scene::names::{self, unknown};
 use crate::scene::surfaces;
 use beamsim_core::effect::contact::{
-    Chain, ChainNode, ContactLaws, ContactStiffness, SceneSurface, SurfaceCarrier, SurfaceContacts,
+    BeamPairs, Chain, ChainNode, ContactLaws, ContactStiffness, Meeting, SceneSurface, Strand, SurfaceCarrier,
+    SurfaceContacts,
 };
 use beamsim_core::kernel::contact::law::damping_of;
 use beamsim_core::model::Amplitude;
@@ -29,17 +30,17 @@ const OF_EXTENSION: f64 = 1e-4;
 /// Steps that a contact in a dynamic stage lasts, at least.
 const STEPS_OF_CONTACT: f64 = 10.0;
 
-const NAME: &str = "contact with surfaces";
+/// Pairs of beams that are named in the reason of contacts, at most.
+const NAMED_MEETINGS: usize = 6;
+
+const NAME: &str = "contact";
 const FRICTION: &str = "friction of contacts";
 
-/// A beam or a node of a contact, before it meets surfaces.
-struct Party {
-    beam: Option<usize>,
-    radius: f64,
-    length: f64,
-    nodes: Vec<ChainNode>,
-    order: usize,
-    stiffness: Vec<ContactStiffness>,
+/// Beams that may touch each other, while contacts are added.
+#[derive(Default)]
+struct PairParts {
+    beams: Vec<(String, Strand)>,
+    meetings: Vec<Meeting>,
 }
 
 impl Composer<'_> {
@@ -53,18 +54,16 @@ impl Composer<'_> {
         }
         let surfaces: Vec<Option<SceneSurface>> = deck.surfaces.iter().map(|table| self.surface(table)).collect();
         let mut out = SurfaceContacts::default();
+        let mut pairs = PairParts::default();
         for contact in &deck.contacts {
-            self.add_contact(contact, &surfaces, &mut out);
+            self.add_contact(contact, &surfaces, &mut out, &mut pairs);
         }
+        out.pairs = BeamPairs::new(pairs.beams, pairs.meetings);
         // Contacts keep the numbers of the tables of surfaces.
         let Some(surfaces) = surfaces.into_iter().collect::<Option<Vec<_>>>() else { return };
         out.surfaces = surfaces;
         let rubs = out.laws.iter().any(ContactLaws::rubs);
-        let elements: usize = out.chains.iter().map(Chain::elements).sum();
-        let reason = format!(
-            "{} [[contact]] table(s): {elements} pair(s) of an element or a body with a surface",
-            deck.contacts.len()
-        );
+        let reason = reason_of(deck.contacts.len(), &out);
         if rubs {
             self.reason(FRICTION, true, "`friction` in [[contact]]");
         } else if deck.effects.allow(EffectWord::Friction) {
@@ -127,11 +126,19 @@ impl Composer<'_> {
         Some(number)
     }
 
-    fn add_contact(&mut self, contact: &deck::Contact, surfaces: &[Option<SceneSurface>], out: &mut SurfaceContacts) {
-        let parties = self.parties(contact);
-        let radius = parties.iter().map(|party| party.radius).fold(f64::INFINITY, f64::min);
-        let penetration = contact.penetration.unwrap_or(PENETRATION * radius);
+    fn add_contact(
+        &mut self,
+        contact: &deck::Contact,
+        surfaces: &[Option<SceneSurface>],
+        out: &mut SurfaceContacts,
+        pairs: &mut PairParts,
+    ) {
         let number = out.laws.len();
+        self.refuse_unused_radii(contact);
+        let parties = self.parties(contact, number);
+        let with: Vec<Strand> = contact.with.iter().filter_map(|name| self.beam_named(contact, name, number)).collect();
+        let radius = parties.iter().chain(&with).map(|party| party.radius).fold(f64::INFINITY, f64::min);
+        let penetration = contact.penetration.unwrap_or(PENETRATION * radius);
         out.laws.push(ContactLaws {
             name: contact.name.value.clone(),
             friction: contact.friction,
@@ -158,33 +165,45 @@ impl Composer<'_> {
                     self.report(Diagnostic::error(message, name.span.clone()));
                     continue;
                 }
-                out.chains.push(Chain {
-                    contact: number,
-                    surface,
-                    beam: party.beam,
-                    radius: party.radius,
-                    length: party.length,
-                    nodes: party.nodes.clone(),
-                    order: party.order,
-                    stiffness: party.stiffness.clone(),
-                    has_caps: contact.ends == EndsWord::Round,
-                });
+                out.chains.push(Chain { surface, strand: party.clone() });
+            }
+        }
+        self.add_meetings(contact, parties, with, pairs);
+    }
+
+    /// Adds the meetings of a contact: beams with other beams, and with themselves.
+    fn add_meetings(&self, contact: &deck::Contact, own: Vec<Strand>, with: Vec<Strand>, pairs: &mut PairParts) {
+        if with.is_empty() && !contact.touches_itself {
+            return;
+        }
+        let first = pairs.beams.len();
+        let second = first + own.len();
+        let end = second + with.len();
+        let name = |strand: &Strand| strand.beam.map_or(String::new(), |beam| self.mesh.beams[beam].name.clone());
+        pairs.beams.extend(own.into_iter().chain(with).map(|strand| (name(&strand), strand)));
+        for a in first..second {
+            pairs.meetings.extend((second..end).map(|b| Meeting { strands: [a, b] }));
+            if contact.touches_itself {
+                pairs.meetings.push(Meeting { strands: [a, a] });
             }
         }
     }
 
-    fn parties(&mut self, contact: &deck::Contact) -> Vec<Party> {
-        let mut parties = Vec::new();
-        self.refuse_unused_radii(contact);
-        for name in &contact.beams {
-            let Some(number) = self.mesh.beams.iter().position(|beam| beam.name == name.value) else {
-                let known = self.deck.beams.iter().map(|beam| beam.name.value.as_str());
-                self.report(unknown("beam", name, known));
-                continue;
-            };
-            let radius = self.radius(contact, name, Some(&self.mesh.beams[number]));
-            parties.extend(radius.map(|radius| self.beam_party(contact, number, radius)));
-        }
+    /// A beam of contact number `own`.
+    fn beam_named(&mut self, contact: &deck::Contact, name: &Spanned<String>, own: usize) -> Option<Strand> {
+        let Some(number) = self.mesh.beams.iter().position(|beam| beam.name == name.value) else {
+            let known = self.deck.beams.iter().map(|beam| beam.name.value.as_str());
+            self.report(unknown("beam", name, known));
+            return None;
+        };
+        let radius = self.radius(contact, name, Some(&self.mesh.beams[number]))?;
+        Some(self.beam_party(contact, own, number, radius))
+    }
+
+    /// The beams and nodes of contact number `own`.
+    fn parties(&mut self, contact: &deck::Contact, own: usize) -> Vec<Strand> {
+        let mut parties: Vec<Strand> =
+            contact.beams.iter().filter_map(|name| self.beam_named(contact, name, own)).collect();
         for name in &contact.nodes {
             let Some((node, _)) = self.node(name) else { continue };
             let radius = self.radius(contact, name, None);
@@ -196,13 +215,15 @@ impl Composer<'_> {
             }
             let (Some(radius), Some(stiffness)) = (radius, stiffness) else { continue };
             let placed = self.mesh.nodes[node];
-            parties.push(Party {
+            parties.push(Strand {
+                contact: own,
                 beam: None,
                 radius,
                 length: 0.0,
                 nodes: vec![ChainNode { node: placed.node, place: placed.place, fraction: 0.0 }],
                 order: 0,
                 stiffness: vec![stiffness],
+                has_caps: true,
             });
         }
         parties
@@ -210,7 +231,8 @@ impl Composer<'_> {
 
     fn refuse_unused_radii(&mut self, contact: &deck::Contact) {
         let ContactRadius::Each(radii) = &contact.radius else { return };
-        let all: Vec<&str> = contact.beams.iter().chain(&contact.nodes).map(|name| name.value.as_str()).collect();
+        let named = contact.beams.iter().chain(&contact.nodes).chain(&contact.with);
+        let all: Vec<&str> = named.map(|name| name.value.as_str()).collect();
         for (name, _) in radii.iter().filter(|(name, _)| !all.contains(&name.value.as_str())) {
             self.report(unknown("beam or node of this contact", name, all.iter().copied()));
         }
@@ -233,19 +255,21 @@ impl Composer<'_> {
         found
     }
 
-    fn beam_party(&self, contact: &deck::Contact, number: usize, radius: f64) -> Party {
+    fn beam_party(&self, contact: &deck::Contact, own: usize, number: usize, radius: f64) -> Strand {
         let beam = &self.mesh.beams[number];
         let node = |(&node, &fraction): (&usize, &f64)| {
             let placed = self.mesh.nodes[node];
             ChainNode { node: placed.node, place: placed.place, fraction }
         };
-        Party {
+        Strand {
+            contact: own,
             beam: Some(number),
             radius,
             length: beam.line.length,
             nodes: beam.nodes.iter().zip(&beam.fractions).map(node).collect(),
             order: beam.order,
             stiffness: (0..beam.elements.len()).map(|k| self.stiffness_of(contact, beam, k)).collect(),
+            has_caps: contact.ends == EndsWord::Round,
         }
     }
 
@@ -280,6 +304,26 @@ impl Composer<'_> {
             Some(self.stiffness_of(contact, beam, (number / beam.order).min(beam.elements.len() - 1)))
         })
     }
+}
+
+/// The reason of contacts, with what may touch what.
+fn reason_of(tables: usize, out: &SurfaceContacts) -> String {
+    let mut parts = Vec::new();
+    let elements: usize = out.chains.iter().map(|chain| chain.elements()).sum();
+    if elements > 0 {
+        parts.push(format!("{elements} pair(s) of an element or a body with a surface"));
+    }
+    if !out.pairs.is_empty() {
+        let meets = |[a, b]: [&str; 2]| if a == b { format!("{a} with itself") } else { format!("{a} with {b}") };
+        let mut named: Vec<String> = out.pairs.names().take(NAMED_MEETINGS).map(meets).collect();
+        if out.pairs.len() > NAMED_MEETINGS {
+            named.push(format!("{} more pairs of beams", out.pairs.len() - NAMED_MEETINGS));
+        }
+        let named = named.join(", ");
+        parts
+            .push(format!("{named} (not where they are near each other along a beam, or near a node that they share)"));
+    }
+    format!("{tables} [[contact]] table(s): {}", parts.join(", "))
 }
 
 /// The shortest time step that dynamic stages of a deck begin with.

@@ -16,7 +16,7 @@ pub(super) fn names(word: EffectWord) -> &'static [&'static str] {
         EffectWord::Gravity => &["gravity on beams", "gravity on bodies"],
         EffectWord::FollowerTangent => &["follower tangent"],
         EffectWord::GeometricStiffness => &["geometric stiffness"],
-        EffectWord::Contact => &["contact with surfaces"],
+        EffectWord::Contact => &["contact"],
         EffectWord::Friction => &["friction of contacts"],
         EffectWord::LargeRotations => &["large rotations"],
     }

@@ -6,67 +6,43 @@
 //! which the surface is farther than they reach have none: the distance changes by no more than a
 //! point moves.
 
+use super::strand::{ChainNode, Strand};
 use crate::kernel::MAX_NODES;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
-use crate::system::{ChainMemory, Node, State};
+use crate::system::{ChainMemory, State};
 use crate::tensor::Vec3;
+use std::ops::Deref;
 
 /// The largest distance, in elements, between the places of a contact in two states.
-const LARGEST_SHIFT: f64 = 1.5;
+pub(super) const LARGEST_SHIFT: f64 = 1.5;
 
 /// The farthest point of an element with equally spaced nodes from any centre, over the farthest
 /// node: the Lebesgue constants of one to four nodes.
-const REACH: [f64; MAX_NODES + 1] = [1.0, 1.0, 1.0, 1.25, 1.64];
+pub(super) const REACH: [f64; MAX_NODES + 1] = [1.0, 1.0, 1.0, 1.25, 1.64];
 
 /// Gaps below this part of the radius are looked at.
 const MARGIN: f64 = 1e-5;
 
 /// Beams without end caps touch with the rim of their end: the surface is nearest beside the end,
 /// not beyond it, if the cosine between its direction and the beam is below this.
-const CAP_COSINE: f64 = 0.5;
-
-/// A node of a chain.
-#[derive(Clone, Copy, Debug)]
-pub struct ChainNode {
-    /// Its slots
-    pub node: Node,
-    /// Its initial place
-    pub place: Vec3,
-    /// The part of the length of the beam before it
-    pub fraction: f64,
-}
-
-/// Stiffness of contacts of an element.
-#[derive(Clone, Copy, Debug)]
-pub struct ContactStiffness {
-    /// First stiffness of augmentations, force per length
-    pub augmented: f64,
-    /// Stiffness of the penalty in dynamic stages, force per length
-    pub penalty: f64,
-}
+pub(super) const CAP_COSINE: f64 = 0.5;
 
 /// A beam or a body against one surface.
 #[derive(Clone, Debug)]
 pub struct Chain {
-    /// Number of the contact that it belongs to
-    pub contact: usize,
     /// Number of the surface
     pub surface: usize,
-    /// Number of the beam in the scene; `None` for a body
-    pub beam: Option<usize>,
-    /// Radius of the section, or of the sphere of a body
-    pub radius: f64,
-    /// Length of the beam; zero for a body
-    pub length: f64,
-    /// The nodes in their order; one for a body
-    pub nodes: Vec<ChainNode>,
-    /// Nodes of an element less one; zero for a body
-    pub order: usize,
-    /// Stiffness by element
-    pub stiffness: Vec<ContactStiffness>,
-    /// True if the ends are half spheres, false if they do not touch
-    pub has_caps: bool,
+    /// The beam or the body
+    pub strand: Strand,
+}
+
+impl Deref for Chain {
+    type Target = Strand;
+
+    fn deref(&self) -> &Strand {
+        &self.strand
+    }
 }
 
 /// A point that may touch the surface.
@@ -108,47 +84,11 @@ struct SeenChain<'a> {
 }
 
 impl Chain {
-    /// The number of elements; one for a body.
-    pub fn elements(&self) -> usize {
-        self.stiffness.len()
-    }
-
-    /// Nodes of element `k`.
-    pub fn nodes_of(&self, k: usize) -> &[ChainNode] {
-        &self.nodes[k * self.order..=(k + 1) * self.order]
-    }
-
     /// The part of the length of the beam before a candidate.
     pub(super) fn fraction(&self, at: &Candidate) -> f64 {
         let nodes = self.nodes_of(at.element);
         let [from, to] = [nodes[0].fraction, nodes[nodes.len() - 1].fraction];
         from + (to - from) * at.s
-    }
-
-    /// The length of the beam that a point at a place carries the force of: its element, or half of
-    /// the way to both neighbours of a node.
-    pub(super) fn share(&self, along: f64) -> f64 {
-        if self.order == 0 {
-            return 0.0;
-        }
-        let last = self.nodes.len() - 1;
-        let at = along * self.order as f64;
-        let (from, to) = if at.fract() == 0.0 {
-            let node = at as usize;
-            (node.saturating_sub(1), (node + 1).min(last))
-        } else {
-            let element = (along as usize).min(self.elements() - 1);
-            (element * self.order, (element + 1) * self.order)
-        };
-        let width = self.length * (self.nodes[to].fraction - self.nodes[from].fraction);
-        if at.fract() == 0.0 { 0.5 * width } else { width }
-    }
-
-    /// The place in elements at a part of the length of the beam.
-    pub(super) fn along(&self, fraction: f64) -> f64 {
-        let next = self.nodes.partition_point(|node| node.fraction < fraction).clamp(1, self.nodes.len() - 1);
-        let [from, to] = [self.nodes[next - 1].fraction, self.nodes[next].fraction];
-        (next as f64 - 1.0 + (fraction - from) / (to - from)) / self.order as f64
     }
 
     /// The least gap of nodes and closest points; infinite where nothing is there to touch.

@@ -1,19 +1,23 @@
-//! Contact of beams and bodies with rigid surfaces.
+//! Contact of beams and bodies with rigid surfaces, of beams with beams, and with themselves.
 //!
 //! Forces and tangents are those of [`crate::kernel::contact`]. This effect finds the points, gives
 //! them the multipliers and tractions of the memory in the state, and writes that memory when a
 //! state is accepted.
 
 mod chain;
+mod pairs;
 mod resultant;
+mod strand;
 mod surface;
 
-pub use chain::{Chain, ChainNode, ContactStiffness};
+pub use chain::Chain;
+pub use pairs::{BeamPairs, Meeting};
+pub use strand::{ChainNode, ContactStiffness, Strand};
 pub use surface::{SceneSurface, SurfaceCarrier};
 
 use super::{
-    ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, Penetration, Roles,
-    TangentForm,
+    ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, MissedPairs, Penetration,
+    Roles, TangentForm,
 };
 use crate::kernel::contact::{
     CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Status,
@@ -22,10 +26,12 @@ use crate::kernel::contact::{
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
 use crate::system::{
-    Assembler, Category, ChainMemory, Connectivity, ContactRegime, Memory, MirrorData, PointMemory, Slot, State,
+    Assembler, Category, ChainMemory, Connectivity, ContactRegime, ListedPair, Memory, MirrorData, PointMemory, Slot,
+    State,
 };
 use crate::tensor::{Mat3, Vec3};
 use chain::{Candidate, shape};
+use pairs::PairRole;
 use std::sync::Arc;
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
@@ -64,7 +70,7 @@ impl ContactLaws {
     }
 }
 
-/// All contacts with rigid surfaces.
+/// All contacts with rigid surfaces, and of beams with each other.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceContacts {
     /// The contacts
@@ -73,6 +79,8 @@ pub struct SurfaceContacts {
     pub surfaces: Vec<SceneSurface>,
     /// Beams and bodies, each against one surface
     pub chains: Vec<Chain>,
+    /// Beams that may touch each other
+    pub pairs: BeamPairs,
 }
 
 /// A chain in a state.
@@ -124,6 +132,11 @@ impl SurfaceContacts {
         ChainNow { chain, laws: &self.laws[chain.contact], surface, carrier, memory, at, candidates, partners }
     }
 
+    /// The pairs of beams with the laws of their contacts.
+    fn pairs(&self) -> PairRole<'_> {
+        PairRole { pairs: &self.pairs, laws: &self.laws }
+    }
+
     /// The number of the first instance of each chain.
     fn first_instances(&self) -> Vec<usize> {
         let mut next = 0;
@@ -161,6 +174,7 @@ impl SurfaceContacts {
             });
         }
         at.contacts.chains = Arc::new(chains);
+        self.pairs().remember(at, accepts);
         dissipated
     }
 
@@ -199,6 +213,7 @@ impl SurfaceContacts {
             }
         }
         at.contacts.chains = Arc::new(chains);
+        self.pairs().change_points(at, &change);
     }
 
     /// Notes the deepest penetration and the shortest contact of a time step.
@@ -221,6 +236,7 @@ impl SurfaceContacts {
         let contacts = &mut at.contacts;
         contacts.deepest = contacts.deepest.max(deepest);
         contacts.shortest = contacts.shortest.into_iter().chain(shortest).min();
+        self.pairs().judge_penalty(at);
     }
 
     fn damping_power(&self, at: &State) -> f64 {
@@ -229,6 +245,7 @@ impl SurfaceContacts {
             self.each_chain(at, Weights::NONE, &mut |_, chain| {
                 chain.each_point(Weights::NONE, &mut |point, _| power += chain.damping_power(point));
             });
+            power += self.pairs().damping_power(at);
         }
         power
     }
@@ -351,8 +368,8 @@ impl<'a> ChainNow<'a> {
         let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
         let gap = state.gap + law.radius - self.chain.radius;
         let force = state.normal_force.force;
-        // The next level begins with a stiffness of its own.
-        let first = self.chain.stiffness[candidate.element].augmented * self.at.contacts.next_factor;
+        // The next level begins with the first stiffness.
+        let first = self.chain.stiffness[candidate.element].augmented * self.at.contacts.first_factor;
         let multiplier = if accepts { force + first * gap } else { force };
         let is_penalty = self.at.contacts.regime == ContactRegime::Penalty;
         let before = point.partner.filter(|_| is_penalty);
@@ -429,7 +446,7 @@ impl PointNow<'_> {
 
 impl Effect for SurfaceContacts {
     fn name(&self) -> &'static str {
-        "contact with surfaces"
+        "contact"
     }
 
     fn category(&self) -> Category {
@@ -448,6 +465,12 @@ impl Effect for SurfaceContacts {
         connectivity
     }
 
+    fn connectivity_with(&self, pairs: &[ListedPair]) -> Connectivity {
+        let mut connectivity = self.connectivity();
+        pairs.iter().for_each(|pair| connectivity.push(self.pairs.slots(pair)));
+        connectivity
+    }
+
     fn tangent(&self) -> TangentForm {
         let damps = |laws: &ContactLaws| laws.damping != 0.0;
         TangentForm::symmetric(!self.laws.iter().any(|laws| laws.rubs() || damps(laws)))
@@ -460,7 +483,9 @@ impl Effect for SurfaceContacts {
         }
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
+        let elements = self.chains.iter().map(|chain| chain.elements()).sum();
+        self.pairs().add(at, &memory.pairs, weights, elements, out);
         let first = self.first_instances();
         self.each_chain(at, weights, &mut |number, chain| {
             chain.each_point(weights, &mut |point, system| {
@@ -488,7 +513,7 @@ impl Effect for SurfaceContacts {
                 largest = largest.max(strain / length);
             });
         });
-        largest
+        largest.max(self.pairs().strain_of(at, field, length))
     }
 
     fn roles(&self) -> Roles<'_> {
@@ -536,7 +561,22 @@ impl Contacts for SurfaceContacts {
                 }
             });
         });
+        self.pairs().survey(at, &mut out);
         out
+    }
+
+    fn list_pairs(&self, at: &mut State) {
+        if at.contacts.pairs.places.is_empty() && !self.pairs.is_empty() {
+            at.contacts.pairs = self.pairs.list(at);
+        }
+    }
+
+    fn list_missed(&self, from: &mut State, to: &State) -> MissedPairs {
+        if self.pairs.is_empty() { MissedPairs::None } else { self.pairs.add_missed(from, to) }
+    }
+
+    fn safe_part(&self, at: &State, increment: &[Vec3]) -> f64 {
+        self.pairs().safe_part(at, increment)
     }
 
     fn augment(&self, at: &mut State) {
@@ -569,9 +609,10 @@ impl Contacts for SurfaceContacts {
         let passed = at.time - before.time;
         at.contacts.dissipated += dissipated + 0.5 * (at.contacts.damping_power + power) * passed;
         at.contacts.damping_power = power;
-        // Not before: friction of the accepted state has the stiffness of its own level.
-        at.contacts.first_factor = at.contacts.next_factor;
-        at.contacts.factor = at.contacts.next_factor;
+        at.contacts.factor = at.contacts.first_factor;
+        if !self.pairs.is_empty() {
+            self.pairs().renew_list(before, at);
+        }
     }
 
     fn change(&self, before: &State, at: &State) -> ContactChange {
@@ -594,7 +635,7 @@ impl Contacts for SurfaceContacts {
                 change = ContactChange::Touches;
             }
         });
-        change
+        if change == ContactChange::None { self.pairs().change(before, at) } else { change }
     }
 
     fn penetrates(&self, at: &State) -> Option<Penetration> {
@@ -623,7 +664,7 @@ impl Contacts for SurfaceContacts {
                 deepest = Some(Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth });
             }
         }
-        deepest
+        deeper(deepest, self.pairs().penetrates(at))
     }
 
     fn hidden_penetration(&self, at: &State) -> Option<Penetration> {
@@ -636,7 +677,7 @@ impl Contacts for SurfaceContacts {
                 deepest = Some(Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth });
             }
         }
-        deepest
+        deeper(deepest, self.pairs().hidden_penetration(at))
     }
 
     fn passed(&self, from: &State, to: &State) -> Option<Slot> {
@@ -661,7 +702,7 @@ impl Contacts for SurfaceContacts {
                 }
             }
         }
-        None
+        self.pairs().passed(from, to)
     }
 
     fn energy(&self, at: &State) -> f64 {
@@ -682,17 +723,28 @@ impl Contacts for SurfaceContacts {
         self.each_chain(at, Weights::NONE, &mut |_, chain| {
             chain.each_point(Weights::NONE, &mut |point, _| energy += point.energy());
         });
-        energy
+        energy + self.pairs().energy(at)
     }
 
     fn resultant(&self, number: usize, at: &State) -> ContactResultant {
-        ContactResultant {
+        let mut sum = ContactResultant {
             length: self.length_in_contact(number, at),
             ..resultant::resultant(&self.chains, &self.surfaces, number, at)
-        }
+        };
+        self.pairs().add_resultant(number, at, &mut sum);
+        sum
     }
 
     fn force_along(&self, beam: usize, fraction: f64, at: &State) -> [f64; 2] {
-        resultant::force_along(&self.chains, beam, fraction, at)
+        let [normal, friction] = resultant::force_along(&self.chains, beam, fraction, at);
+        [normal + self.pairs().force_along(beam, fraction, at), friction]
+    }
+}
+
+/// The deeper one of two penetrations.
+fn deeper(a: Option<Penetration>, b: Option<Penetration>) -> Option<Penetration> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if b.depth > a.depth { b } else { a }),
+        (a, b) => a.or(b),
     }
 }

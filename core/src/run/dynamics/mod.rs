@@ -28,6 +28,9 @@ use std::f64::consts::PI;
 /// The smallest part in which a fixed step that fails is taken.
 const SMALLEST_PART: f64 = 1.0 / 64.0;
 
+/// Attempts at a step with more pairs of beams near each other, at most.
+const MOST_LISTS: usize = 4;
+
 /// Strains that Newton may leave where an iteration ends.
 const TOLERATED_STRAIN: f64 = 1e-9;
 
@@ -304,6 +307,12 @@ impl Dynamics<'_, '_> {
             self.stage.state.copy_from(self.stage.good);
             result = self.attempt_step(step, next);
         }
+        let mut lists = 0;
+        while result.is_err() && lists < MOST_LISTS && self.stage.looks_at_more() {
+            lists += 1;
+            self.each_predictor(Predictor::fail);
+            result = self.attempt_step(step, next);
+        }
         if result.is_err() {
             // It may have come to an end that is refused.
             self.each_predictor(Predictor::fail);
@@ -332,6 +341,7 @@ impl Dynamics<'_, '_> {
         self.stage.refuse_departures()?;
         self.stage.refuse_leaps()?;
         self.stage.refuse_passing()?;
+        self.stage.refuse_missed()?;
         let StageRun { assembly, newton, state, good, .. } = &mut *self.stage;
         newton.end_step(&assembly.system, StepEnds { from: good, to: state }, &step, self.increments.as_ref());
         Ok(())

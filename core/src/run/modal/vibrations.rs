@@ -57,7 +57,7 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
     if dof_map.count() > MOST_UNKNOWNS || (is_massless && is_even_in_space) {
         return Ok(Vibrations::Unknown);
     }
-    let mut assembly = Assembly::new(&context, dof_map, stage.model);
+    let mut assembly = Assembly::about(stage.state, &context, dof_map, stage.model);
     let Some(mut solver) = LinearSolver::new(&assembly.system, &stage.model.multipliers) else {
         return Ok(Vibrations::Unknown);
     };

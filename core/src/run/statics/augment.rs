@@ -30,12 +30,22 @@ const STIFFEST: f64 = 1e6;
 /// A level that takes so many augmentations makes the next begin with a larger stiffness.
 const MANY_AUGMENTATIONS: usize = 3;
 
+/// Attempts at a level with a stiffer contact of beams, at most.
+const MOST_STIFFENINGS: usize = 2;
+
+/// Attempts at a level with more pairs of beams, at most.
+const MOST_LISTS: usize = 4;
+
 impl StageRun<'_> {
     /// One attempt at a load factor, where contacts may act: first as stiff as the level before,
     /// then softer.
     pub(super) fn attempt_with_contacts(&mut self, load: f64) -> Result<(), NewtonFailure> {
+        let first_factor = self.good.contacts.first_factor;
+        let mut stiffenings = 0;
+        let mut lists = 0;
         loop {
-            let failure = match self.attempt_once(load).and_then(|()| self.augment()) {
+            let attempt = self.attempt_once(load).and_then(|()| self.augment());
+            let failure = match attempt.and_then(|()| self.refuse_missed()) {
                 Ok(()) => {
                     self.state.contacts.goes_on = true;
                     return Ok(());
@@ -54,6 +64,23 @@ impl StageRun<'_> {
                 | NewtonFailure::StepTooSmall { .. }
                 | NewtonFailure::Interrupted(_) => false,
             };
+            if lists < MOST_LISTS && self.looks_at_more() {
+                lists += 1;
+                continue;
+            }
+            if may_soften && self.newton.was_shortened {
+                // A soft contact cannot keep beams apart, whose force ends where centre lines meet.
+                let is_stiffer = stiffenings < MOST_STIFFENINGS;
+                let factor = if is_stiffer { self.good.contacts.first_factor * GROWTH } else { first_factor };
+                self.set_first_factor(factor.min(STIFFEST_START));
+                if !is_stiffer {
+                    return Err(failure);
+                }
+                stiffenings += 1;
+                self.counters.contacts.stiffenings += 1;
+                self.state.copy_all_but_rates(self.good);
+                continue;
+            }
             if may_soften && self.good.contacts.goes_on && self.good.contacts.touches() {
                 // Where all points slide nothing may hold a part.
                 self.good.contacts.goes_on = false;
@@ -80,7 +107,6 @@ impl StageRun<'_> {
     fn set_first_factor(&mut self, factor: f64) {
         for contacts in [&mut self.good.contacts, &mut self.state.contacts] {
             contacts.first_factor = factor;
-            contacts.next_factor = factor;
             contacts.factor = factor;
         }
     }
@@ -134,7 +160,7 @@ impl StageRun<'_> {
         self.counters.contacts.changes += u64::from(self.contact_change != ContactChange::None);
         if augmentations >= MANY_AUGMENTATIONS {
             let grown = self.good.contacts.first_factor * GROWTH;
-            self.state.contacts.next_factor = grown.min(STIFFEST_START);
+            self.state.contacts.first_factor = grown.min(STIFFEST_START);
         }
         Ok(())
     }

@@ -245,7 +245,9 @@ impl LevelControl<'_, '_> {
     }
 
     fn take_step(&mut self, signature: Option<Signature>) -> Result<(), Failure> {
+        let lists = self.stage.counters.contacts.lists;
         self.stage.accept()?;
+        let is_assembled_anew = lists != self.stage.counters.contacts.lists;
         let before = std::mem::replace(&mut self.stability.signature, signature);
         if self.stage.contact_change == ContactChange::None {
             tell_of_points(self.stage, &mut self.space, None, before, signature)?;
@@ -253,7 +255,7 @@ impl LevelControl<'_, '_> {
         self.stage.good.copy_all_but_rates(self.stage.state);
         self.levels.reached_by = self.levels.reached_by.max(ReachedBy::Levels);
         // Where pivots were looked at the stiffness is that of this state.
-        if signature.is_some() && !self.stage.state.contacts.touches() {
+        if signature.is_some() && !is_assembled_anew && !self.stage.state.contacts.touches() {
             self.stage.newton.begin_with(&self.stage.assembly.system);
         }
         self.levels.double();

@@ -94,15 +94,36 @@ struct Descent<'s, 'r> {
 
 impl<'s, 'r> Descent<'s, 'r> {
     fn new(stage: &'s mut StageRun<'r>) -> Result<Self, Failure> {
+        let (assembly, newton) = Self::assemble(stage)?;
+        Ok(Self { stage, assembly, newton, steps: MOST_STEPS })
+    }
+
+    /// The effects of a stage with an artificial resistance.
+    fn assemble(stage: &StageRun) -> Result<(Assembly, Newton), Failure> {
         let dof_map = stage.schedule.dof_map(stage.model, stage.plane).map_err(|error| stage.describe(error))?;
         let slots = stage.model.kinds.iter().enumerate().filter(|(_, kind)| !kind.is_multiplier());
         let slots = slots.map(|(slot, kind)| (slot as Slot, *kind == SlotKind::Rotation)).collect();
         let context = stage.stage().context(stage.number);
         let mut acting = stage.model.acting(&context);
         acting.push(Arc::new(Resistance { slots, arm: ARM * stage.model.length }));
-        let assembly = Assembly::of(acting, &context, dof_map, stage.model);
+        let pairs = stage.state.contacts.pairs.list.clone();
+        let assembly = Assembly::of(acting, &context, dof_map, stage.model, pairs);
         let newton = newton_for(stage.stage(), &assembly, stage.model, stage.moment())?;
-        Ok(Self { stage, assembly, newton, steps: MOST_STEPS })
+        Ok((assembly, newton))
+    }
+
+    /// Assembles anew where other beams are near each other in the last good state.
+    fn fit_assembly(&mut self) -> Result<(), Failure> {
+        if self.assembly.fits(self.stage.good) {
+            return Ok(());
+        }
+        self.stage.state.copy_all_but_rates(self.stage.good);
+        self.stage.fit_assembly()?;
+        let (assembly, newton) = Self::assemble(self.stage)?;
+        let old = std::mem::replace(&mut self.assembly, assembly);
+        self.assembly.take_over(old);
+        self.newton = newton;
+        Ok(())
     }
 
     /// From the last good state to one at rest at the load factor `target`; `false`, with the last
@@ -158,6 +179,7 @@ impl<'s, 'r> Descent<'s, 'r> {
             self.stage.tell_progress(start.load)?;
             self.steps -= 1;
             let first = lifts.then_some(load);
+            self.fit_assembly()?;
             let has_moved = self.step_against(resistance, first);
             self.stage.unless_interrupted()?;
             if !has_moved {
@@ -229,6 +251,7 @@ impl<'s, 'r> Descent<'s, 'r> {
             .and_then(|()| self.stage.refuse_leaps())
             .and_then(|()| self.stage.refuse_windings());
         let solved = solved.and_then(|()| self.stage.refuse_passing());
+        let solved = solved.and_then(|()| self.stage.refuse_missed());
         if solved.is_err() {
             return false;
         }

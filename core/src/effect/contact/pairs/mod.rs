@@ -1,0 +1,186 @@
+//! Contact of beams with beams, and of beams with themselves.
+//!
+//! A list in the state holds the pairs of elements that are near each other ([`list`]); nothing else
+//! is looked at. Elements that cross carry a force at their closest points; elements side by side
+//! carry it at the nodes of both ([`candidate`]).
+
+mod candidate;
+mod list;
+mod point;
+mod role;
+
+pub(super) use role::PairRole;
+
+use super::strand::{ChainNode, Strand};
+use crate::system::{ListedPair, Slot, State};
+use crate::tensor::Vec3;
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+/// Two strands that may touch, or one that may touch itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Meeting {
+    /// Numbers of the first and of the second strand, in rising order; equal for a strand that may
+    /// touch itself
+    pub strands: [usize; 2],
+}
+
+impl Meeting {
+    /// True for a strand and itself.
+    pub fn is_own(&self) -> bool {
+        self.strands[0] == self.strands[1]
+    }
+}
+
+/// A node that two strands of a meeting share.
+#[derive(Clone, Copy, Debug)]
+struct Join {
+    /// The lengths of the strands before it
+    arcs: [f64; 2],
+}
+
+/// Beams that may touch each other.
+#[derive(Clone, Debug, Default)]
+pub struct BeamPairs {
+    strands: Vec<Strand>,
+    /// The names of the beams of the strands
+    names: Vec<String>,
+    meetings: Vec<Meeting>,
+    /// The meeting of two strands
+    by_strands: BTreeMap<[usize; 2], usize>,
+    /// The nodes that the strands of each meeting share
+    joins: Vec<Vec<Join>>,
+    /// The number of the first node of each strand among all, and their number
+    first_nodes: Vec<usize>,
+    /// The number of the first element of each strand among all, and their number
+    first_elements: Vec<usize>,
+}
+
+/// The strand of each element, and its number there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct ElementOf {
+    strand: usize,
+    element: usize,
+}
+
+impl BeamPairs {
+    /// Meetings of beams: each strand is a beam with its name.
+    pub fn new(beams: Vec<(String, Strand)>, meetings: Vec<Meeting>) -> Self {
+        let (names, strands): (Vec<String>, Vec<Strand>) = beams.into_iter().unzip();
+        let sums = |count: fn(&Strand) -> usize| {
+            let mut sum = 0;
+            let mut sums = vec![0];
+            sums.extend(strands.iter().map(|strand| {
+                sum += count(strand);
+                sum
+            }));
+            sums
+        };
+        Self {
+            first_nodes: sums(|strand| strand.nodes.len()),
+            first_elements: sums(Strand::elements),
+            by_strands: meetings.iter().enumerate().map(|(k, meeting)| (meeting.strands, k)).collect(),
+            joins: meetings.iter().map(|meeting| joins(meeting, &strands)).collect(),
+            strands,
+            names,
+            meetings,
+        }
+    }
+
+    /// True if no beams may meet.
+    pub fn is_empty(&self) -> bool {
+        self.meetings.is_empty()
+    }
+
+    /// The number of meetings.
+    pub fn len(&self) -> usize {
+        self.meetings.len()
+    }
+
+    /// The names of both beams of each meeting.
+    pub fn names(&self) -> impl Iterator<Item = [&str; 2]> {
+        self.meetings.iter().map(|meeting| meeting.strands.map(|strand| self.names[strand].as_str()))
+    }
+
+    /// The contact that a meeting belongs to.
+    fn contact_of(&self, meeting: usize) -> usize {
+        self.strands[self.meetings[meeting].strands[0]].contact
+    }
+
+    /// Both strands of a meeting.
+    fn both(&self, meeting: usize) -> [&Strand; 2] {
+        self.meetings[meeting].strands.map(|strand| &self.strands[strand])
+    }
+
+    /// The slots that a pair of elements couples: displacement and rotation of each node.
+    pub(super) fn slots(&self, pair: &ListedPair) -> impl Iterator<Item = Slot> {
+        let [a, b] = self.nodes_of(pair);
+        a.iter().chain(b).flat_map(|node| [node.node.u, node.node.p])
+    }
+
+    /// The nodes of both elements of a pair.
+    fn nodes_of(&self, pair: &ListedPair) -> [&[ChainNode]; 2] {
+        let [a, b] = self.both(pair.meeting as usize);
+        [a.nodes_of(pair.elements[0] as usize), b.nodes_of(pair.elements[1] as usize)]
+    }
+
+    /// Places of all nodes in a state.
+    fn places(&self, at: &State) -> Vec<Vec3> {
+        let nodes = self.strands.iter().flat_map(|strand| &strand.nodes);
+        nodes.map(|node| node.place + at.q[node.node.u as usize]).collect()
+    }
+
+    /// Vectors at the nodes of an element from those at all nodes.
+    fn of_element<'p>(&self, of: ElementOf, places: &'p [Vec3]) -> &'p [Vec3] {
+        let order = self.strands[of.strand].order;
+        let first = self.first_nodes[of.strand] + of.element * order;
+        &places[first..=first + order]
+    }
+
+    /// Both elements of a pair.
+    fn elements_of(&self, pair: &ListedPair) -> [ElementOf; 2] {
+        let [a, b] = self.meetings[pair.meeting as usize].strands;
+        let [i, j] = pair.elements.map(|element| element as usize);
+        [ElementOf { strand: a, element: i }, ElementOf { strand: b, element: j }]
+    }
+
+    /// The strand of an element by its number among all.
+    fn element(&self, number: usize) -> ElementOf {
+        let strand = self.first_elements.partition_point(|&first| first <= number) - 1;
+        ElementOf { strand, element: number - self.first_elements[strand] }
+    }
+
+    /// True for elements of one beam, or of beams that share a node, which are so near each other
+    /// along the beams that they cannot touch but by the bend of the beams between.
+    fn are_neighbours(&self, meeting: usize, elements: [usize; 2]) -> bool {
+        let strands = self.both(meeting);
+        let arcs = [0, 1].map(|side| arcs_of(strands[side], elements[side]));
+        let longest = arcs.map(|[from, to]| to - from).into_iter().fold(0.0, f64::max);
+        let least = 0.5 * PI * (strands[0].radius + strands[1].radius) + longest;
+        if self.meetings[meeting].is_own() && arcs[1][0] - arcs[0][1] < least {
+            return true;
+        }
+        let beside = |[from, to]: [f64; 2], at: f64| (from - at).max(at - to).max(0.0);
+        self.joins[meeting].iter().any(|join| beside(arcs[0], join.arcs[0]) + beside(arcs[1], join.arcs[1]) < least)
+    }
+}
+
+/// The lengths of a beam before and behind an element.
+fn arcs_of(strand: &Strand, element: usize) -> [f64; 2] {
+    let nodes = strand.nodes_of(element);
+    [nodes[0].fraction, nodes[nodes.len() - 1].fraction].map(|fraction| fraction * strand.length)
+}
+
+/// The nodes that the strands of a meeting share.
+fn joins(meeting: &Meeting, strands: &[Strand]) -> Vec<Join> {
+    let [a, b] = meeting.strands.map(|strand| &strands[strand]);
+    let mut known: BTreeMap<Slot, Vec<usize>> = BTreeMap::new();
+    a.nodes.iter().enumerate().for_each(|(k, node)| known.entry(node.node.u).or_default().push(k));
+    let mut joins = Vec::new();
+    for (j, node) in b.nodes.iter().enumerate() {
+        for &k in known.get(&node.node.u).into_iter().flatten().filter(|&&k| !(meeting.is_own() && k == j)) {
+            joins.push(Join { arcs: [a.nodes[k].fraction * a.length, node.fraction * b.length] });
+        }
+    }
+    joins
+}

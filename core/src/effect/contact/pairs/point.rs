@@ -1,0 +1,380 @@
+//! Contact points of listed pairs in a state, with their forces.
+
+use super::candidate::{PairCandidate, Side, candidates};
+use super::{BeamPairs, ElementOf};
+use crate::effect::contact::chain::LARGEST_SHIFT;
+use crate::effect::contact::strand::ContactStiffness;
+use crate::effect::contact::{ContactLaws, TOUCHING};
+use crate::kernel::contact::along::weighted_sum;
+use crate::kernel::contact::{
+    CarriedTraction, ContactNode, NodeBefore, NormalLaw, PairLaw, PairSide, PointState, ShapeAt, add_pair,
+};
+use crate::kernel::{ElementSystem, Weights};
+use crate::rotation::Rotation;
+use crate::system::{ContactRegime, ListedPair, PairPointKind, PairPointMemory, PointMemory, State};
+use crate::tensor::{Mat3, Vec3};
+
+/// Closest points nearer to each other than this part of an element, on both beams, are one contact.
+const SAME_PLACE: f64 = 0.9;
+
+/// A contact point of two beams in a state.
+pub(super) struct PairPoint<'a> {
+    /// Number of the pair in the list
+    pub number: usize,
+    pub pair: ListedPair,
+    pub candidate: PairCandidate,
+    /// Number of the point that it was, and its memory
+    pub partner: Option<(usize, &'a PairPointMemory)>,
+    pub law: PairLaw,
+    pub state: PointState,
+    /// The place on the centre line of the first beam
+    pub place: Vec3,
+    /// The number of nodes to both sides, and their shape functions
+    pub shapes: [[f64; 4]; 2],
+}
+
+/// A candidate with the number of its pair.
+struct Found {
+    number: usize,
+    candidate: PairCandidate,
+}
+
+/// A look at listed pairs in a state.
+pub(super) struct PairsNow<'a> {
+    pub pairs: &'a BeamPairs,
+    pub laws: &'a [ContactLaws],
+    pub at: &'a State,
+    /// The list, which is that of the state but in an assembly of another one
+    pub list: &'a [ListedPair],
+    places: Vec<Vec3>,
+}
+
+/// Calls a function of two numbers of nodes, for elements of given orders.
+macro_rules! of_orders {
+    ($orders:expr, $of:ident . $function:ident $arguments:tt) => {
+        match $orders {
+            [1, 1] => $of.$function::<2, 2> $arguments,
+            [1, 2] => $of.$function::<2, 3> $arguments,
+            [1, _] => $of.$function::<2, 4> $arguments,
+            [2, 1] => $of.$function::<3, 2> $arguments,
+            [2, 2] => $of.$function::<3, 3> $arguments,
+            [2, _] => $of.$function::<3, 4> $arguments,
+            [_, 1] => $of.$function::<4, 2> $arguments,
+            [_, 2] => $of.$function::<4, 3> $arguments,
+            [_, _] => $of.$function::<4, 4> $arguments,
+        }
+    };
+}
+
+impl<'a> PairsNow<'a> {
+    pub fn new(pairs: &'a BeamPairs, laws: &'a [ContactLaws], at: &'a State, list: &'a [ListedPair]) -> Self {
+        let places = if list.is_empty() { Vec::new() } else { pairs.places(at) };
+        Self { pairs, laws, at, list, places }
+    }
+
+    /// Visits the points of all pairs that act, with their systems.
+    pub fn each_point(&self, weights: Weights, visit: &mut dyn FnMut(&PairPoint<'a>, &ElementSystem)) {
+        let mut first = 0;
+        for group in self.list.chunk_by(|a, b| a.meeting == b.meeting) {
+            let meeting = group[0].meeting as usize;
+            let laws = &self.laws[self.pairs.contact_of(meeting)];
+            if self.at.amplitude[laws.amplitude] != 0.0 {
+                self.each_of_meeting(first, group, laws, weights, visit);
+            }
+            first += group.len();
+        }
+    }
+
+    fn each_of_meeting(
+        &self,
+        first: usize,
+        group: &[ListedPair],
+        laws: &'a ContactLaws,
+        weights: Weights,
+        visit: &mut dyn FnMut(&PairPoint<'a>, &ElementSystem),
+    ) {
+        let memory = self.memory_of_meeting(group[0].meeting);
+        let reach = self.reach(group[0].meeting as usize, memory.1, laws);
+        let mut found = Vec::new();
+        for (number, pair) in (first..).zip(group) {
+            if self.pairs.chord_gap(pair, &self.places) <= reach {
+                let blend = self.at.contacts.pairs.blend.get(number).copied().unwrap_or(1.0);
+                let candidates = self.candidates(pair, blend);
+                found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
+            }
+        }
+        if self.at.contacts.regime == ContactRegime::Penalty {
+            self.keep_nearest(&mut found);
+        }
+        let partners = self.matched(&found, memory.1);
+        let orders = self.pairs.both(group[0].meeting as usize).map(|strand| strand.order);
+        let mut system = ElementSystem::new(2 * (orders[0] + orders[1] + 2));
+        for (Found { number, candidate }, partner) in found.iter().zip(partners) {
+            let partner = partner.map(|own| (memory.0 + own, &memory.1[own]));
+            let law = self.law(&self.list[*number], candidate, partner.map(|(_, memory)| memory), laws);
+            system.clear_for(weights);
+            let pair = self.list[*number];
+            let point = of_orders!(orders, self.point(*number, &pair, candidate, partner, law, weights, &mut system));
+            if let Some(point) = point {
+                visit(&point, &system);
+            }
+        }
+    }
+
+    /// The points of a meeting that had a force, and the number of the first of them.
+    fn memory_of_meeting(&self, meeting: u32) -> (usize, &'a [PairPointMemory]) {
+        let points = &self.at.contacts.pairs.points;
+        let first = points.partition_point(|point| point.meeting < meeting);
+        let end = points.partition_point(|point| point.meeting <= meeting);
+        (first, &points[first..end])
+    }
+
+    /// The largest gap at which points of a meeting may have a force, or touch.
+    fn reach(&self, meeting: usize, memory: &[PairPointMemory], laws: &ContactLaws) -> f64 {
+        let touching = TOUCHING * laws.penetration;
+        let of_point = |point: &PairPointMemory| match self.at.contacts.regime {
+            ContactRegime::Penalty => point.point.offset,
+            ContactRegime::Augmented => {
+                let stiffness = self.stiffness_at(meeting, point).augmented * self.at.contacts.factor;
+                point.point.multiplier / stiffness
+            }
+        };
+        memory.iter().map(of_point).fold(touching, f64::max)
+    }
+
+    /// The stiffness of the contact at a point in memory.
+    pub fn stiffness_at(&self, meeting: usize, point: &PairPointMemory) -> ContactStiffness {
+        let strands = self.pairs.both(meeting);
+        let place = [point.point.place, point.on_second];
+        let element = |side: usize| (place[side] as usize).min(strands[side].elements() - 1) as u32;
+        self.stiffness(&ListedPair { meeting: meeting as u32, elements: [element(0), element(1)] })
+    }
+
+    /// The stiffness of the contact of two elements: that of both in series.
+    fn stiffness(&self, pair: &ListedPair) -> ContactStiffness {
+        let strands = self.pairs.both(pair.meeting as usize);
+        let [a, b] = [0, 1].map(|side| strands[side].stiffness[pair.elements[side] as usize]);
+        let in_series = |a: f64, b: f64| a * b / (a + b);
+        ContactStiffness { augmented: in_series(a.augmented, b.augmented), penalty: in_series(a.penalty, b.penalty) }
+    }
+
+    fn candidates(&self, pair: &ListedPair, blend: f64) -> Vec<PairCandidate> {
+        let orders = self.pairs.both(pair.meeting as usize).map(|strand| strand.order);
+        of_orders!(orders, self.candidates_of(pair, blend))
+    }
+
+    fn candidates_of<const NA: usize, const NB: usize>(&self, pair: &ListedPair, blend: f64) -> Vec<PairCandidate> {
+        let [a, b] = self.pairs.elements_of(pair);
+        let mut out = Vec::new();
+        candidates(&self.side::<NA>(a), &self.side::<NB>(b), blend, &mut out);
+        out
+    }
+
+    fn side<const N: usize>(&self, of: ElementOf) -> Side<N> {
+        let strand = &self.pairs.strands[of.strand];
+        let nodes = |element: usize| {
+            let places = self.pairs.of_element(ElementOf { strand: of.strand, element }, &self.places);
+            std::array::from_fn(|i| places[i])
+        };
+        let slope_at_start = |nodes: [Vec3; N]| weighted_sum(&ShapeAt::<N>::new(0.0).slopes, |i| nodes[i]);
+        let next = of.element + 1;
+        Side {
+            nodes: nodes(of.element),
+            next: (next < strand.elements()).then(|| slope_at_start(nodes(next))),
+            is_first: of.element == 0,
+            has_caps: strand.has_caps,
+        }
+    }
+
+    /// The least gap of the surfaces of a pair.
+    pub fn gap(&self, pair: &ListedPair) -> f64 {
+        let strands = self.pairs.both(pair.meeting as usize);
+        let bound = self.pairs.chord_gap(pair, &self.places);
+        if strands.iter().all(|strand| strand.order == 1) {
+            return bound;
+        }
+        let orders = strands.map(|strand| strand.order);
+        let distance = |candidate: &PairCandidate| of_orders!(orders, self.distance(pair, candidate.at));
+        let distances = self.candidates(pair, 0.5).iter().map(distance).fold(f64::INFINITY, f64::min);
+        distances - strands[0].radius - strands[1].radius
+    }
+
+    fn distance<const NA: usize, const NB: usize>(&self, pair: &ListedPair, [s, e]: [f64; 2]) -> f64 {
+        let [a, b] = self.pairs.elements_of(pair);
+        (self.side::<NA>(a).place(s) - self.side::<NB>(b).place(e)).norm()
+    }
+
+    /// Of closest points near each other on both beams, as at the inside of a kink, keeps the one with
+    /// the smallest gap: two penalties would jump to one where the points merge.
+    fn keep_nearest(&self, found: &mut Vec<Found>) {
+        let along = |found: &Found| {
+            let pair = &self.list[found.number];
+            [0, 1].map(|side| f64::from(pair.elements[side]) + found.candidate.at[side])
+        };
+        let distance = |found: &Found| {
+            let pair = &self.list[found.number];
+            let orders = self.pairs.both(pair.meeting as usize).map(|strand| strand.order);
+            of_orders!(orders, self.distance(pair, found.candidate.at))
+        };
+        let closest = |found: &&Found| found.candidate.kind == PairPointKind::Closest;
+        let all: Vec<([f64; 2], f64)> =
+            found.iter().filter(closest).map(|found| (along(found), distance(found))).collect();
+        let is_beaten = |own: usize| {
+            let (place, gap) = all[own];
+            all.iter().enumerate().any(|(other, (at, less))| {
+                let is_near = place.iter().zip(at).all(|(a, b)| (a - b).abs() < SAME_PLACE);
+                is_near && (*less < gap || (*less == gap && other < own))
+            })
+        };
+        let mut number = 0;
+        found.retain(|found| {
+            let is_closest = found.candidate.kind == PairPointKind::Closest;
+            number += usize::from(is_closest);
+            !(is_closest && is_beaten(number - 1))
+        });
+    }
+
+    /// True if a point continues one in memory.
+    pub fn is_among(&self, point: &PairPoint, memory: &[PairPointMemory]) -> bool {
+        let first = memory.partition_point(|known| known.meeting < point.pair.meeting);
+        let end = memory.partition_point(|known| known.meeting <= point.pair.meeting);
+        !links(&point.pair, &point.candidate, &memory[first..end]).is_empty()
+    }
+
+    /// The number of the last point in memory of each candidate: the nearest ones first, each once.
+    fn matched(&self, found: &[Found], memory: &[PairPointMemory]) -> Vec<Option<usize>> {
+        let mut partner = vec![None; found.len()];
+        let mut all: Vec<(f64, usize, usize)> = Vec::new();
+        for (k, Found { number, candidate }) in found.iter().enumerate() {
+            let own = links(&self.list[*number], candidate, memory);
+            all.extend(own.into_iter().map(|(shift, j)| (shift, k, j)));
+        }
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        let mut taken = vec![false; memory.len()];
+        for (_, k, j) in all {
+            if partner[k].is_none() && !taken[j] {
+                partner[k] = Some(j);
+                taken[j] = true;
+            }
+        }
+        partner
+    }
+
+    fn law(
+        &self,
+        pair: &ListedPair,
+        candidate: &PairCandidate,
+        partner: Option<&PairPointMemory>,
+        laws: &ContactLaws,
+    ) -> PairLaw {
+        let contacts = &self.at.contacts;
+        let stiffness = self.stiffness(pair);
+        let normal = match contacts.regime {
+            ContactRegime::Augmented => NormalLaw::Augmented {
+                multiplier: partner.map_or(0.0, |point| point.point.multiplier),
+                stiffness: stiffness.augmented * contacts.factor,
+                touching: TOUCHING * laws.penetration,
+            },
+            ContactRegime::Penalty => {
+                NormalLaw::Penalty { stiffness: stiffness.penalty, damping: laws.damping, toe: 0.0 }
+            }
+        };
+        let [a, b] = self.pairs.both(pair.meeting as usize);
+        let is_penalty = contacts.regime == ContactRegime::Penalty;
+        let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.point.offset);
+        PairLaw {
+            radii: [a.radius + offset, b.radius],
+            normal,
+            friction: None,
+            carried: CarriedTraction::default(),
+            carrier: 0,
+            free: candidate.free,
+            weight: candidate.weight,
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn point<const NA: usize, const NB: usize>(
+        &self,
+        number: usize,
+        pair: &ListedPair,
+        candidate: &PairCandidate,
+        partner: Option<(usize, &'a PairPointMemory)>,
+        law: PairLaw,
+        weights: Weights,
+        out: &mut ElementSystem,
+    ) -> Option<PairPoint<'a>> {
+        let [a, b] = [0, 1].map(|side| (self.pairs.nodes_of(pair)[side], candidate.at[side]));
+        let a = PairSide::<NA> { nodes: std::array::from_fn(|i| self.node(&a.0[i])), shape: ShapeAt::new(a.1) };
+        let b = PairSide::<NB> { nodes: std::array::from_fn(|i| self.node(&b.0[i])), shape: ShapeAt::new(b.1) };
+        let state = add_pair(&a, &b, &law, weights, out)?;
+        let mut shapes = [[0.0; 4]; 2];
+        shapes[0][..NA].copy_from_slice(&a.shape.values);
+        shapes[1][..NB].copy_from_slice(&b.shape.values);
+        Some(PairPoint { number, pair: *pair, candidate: *candidate, partner, law, state, place: a.place(), shapes })
+    }
+
+    fn node(&self, node: &super::ChainNode) -> ContactNode {
+        ContactNode {
+            place: node.place + self.at.q[node.node.u as usize],
+            velocity: self.at.v[node.node.u as usize],
+            rotation: Rotation::new(Vec3::ZERO),
+            before: NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY },
+        }
+    }
+
+    /// The memory of a point with a force.
+    pub fn memory_of(&self, point: &PairPoint, accepts: bool) -> PairPointMemory {
+        let PairPoint { pair, candidate, state, law, .. } = point;
+        let [a, _] = self.pairs.both(pair.meeting as usize);
+        let contacts = &self.at.contacts;
+        let offset = law.radii[0] - a.radius;
+        let gap = state.gap + offset;
+        let force = state.normal_force.force;
+        // Stages go on with the first stiffness.
+        let first = self.stiffness(pair).augmented * contacts.first_factor;
+        let is_penalty = contacts.regime == ContactRegime::Penalty;
+        let before = point.partner.filter(|_| is_penalty).map(|(_, before)| before.point);
+        PairPointMemory {
+            meeting: pair.meeting,
+            kind: candidate.kind,
+            on_second: f64::from(pair.elements[1]) + candidate.at[1],
+            weight: candidate.weight,
+            point: PointMemory {
+                place: f64::from(pair.elements[0]) + candidate.at[0],
+                edge: None,
+                force,
+                multiplier: if accepts { force + first * gap } else { force },
+                gap,
+                traction: Vec3::ZERO,
+                normal: state.normal,
+                slides: false,
+                offset: before.map_or(0.0, |before| before.offset),
+                steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
+                push: state.normal * (force * candidate.weight),
+                at: point.place - state.normal * (a.radius + 0.5 * gap),
+            },
+        }
+    }
+}
+
+/// The points in memory that a candidate may have been, each with the distance of its place in
+/// elements.
+fn links(pair: &ListedPair, candidate: &PairCandidate, memory: &[PairPointMemory]) -> Vec<(f64, usize)> {
+    let along = [0, 1].map(|side| f64::from(pair.elements[side]) + candidate.at[side]);
+    let first = memory.partition_point(|point| point.point.place < along[0] - LARGEST_SHIFT);
+    let near = memory[first..].iter().take_while(|point| point.point.place <= along[0] + LARGEST_SHIFT);
+    let mut links = Vec::new();
+    for (j, point) in near.enumerate().filter(|(_, point)| point.kind == candidate.kind) {
+        let shifts = [point.point.place - along[0], point.on_second - along[1]].map(f64::abs);
+        let is_same = match candidate.kind {
+            PairPointKind::Closest => true,
+            PairPointKind::NodeOfFirst => shifts[0] == 0.0,
+            PairPointKind::NodeOfSecond => shifts[1] == 0.0,
+        };
+        if is_same && shifts[1] <= LARGEST_SHIFT {
+            links.push((shifts[0] + shifts[1], first + j));
+        }
+    }
+    links
+}

@@ -1,0 +1,280 @@
+//! The role of contacts for pairs of beams.
+
+use super::BeamPairs;
+use super::point::{PairPoint, PairsNow};
+use crate::effect::contact::strand::ContactStiffness;
+use crate::effect::contact::{ContactLaws, RELEVANT_FORCE, ROUNDED};
+use crate::effect::{ContactChange, ContactResultant, ContactSurvey, Penetration};
+use crate::kernel::Weights;
+use crate::kernel::contact::{NormalLaw, Status};
+use crate::system::{Assembler, ListedPair, PairPointKind, PairPointMemory, PointMemory, Slot, State};
+use crate::tensor::Vec3;
+use std::sync::Arc;
+
+/// Pairs of beams with the laws of their contacts.
+#[derive(Clone, Copy)]
+pub(in crate::effect::contact) struct PairRole<'a> {
+    pub pairs: &'a BeamPairs,
+    pub laws: &'a [ContactLaws],
+}
+
+impl<'a> PairRole<'a> {
+    fn now(self, at: &'a State) -> PairsNow<'a> {
+        PairsNow::new(self.pairs, self.laws, at, &at.contacts.pairs.list)
+    }
+
+    fn each(self, at: &'a State, visit: &mut dyn FnMut(&PairPoint)) {
+        self.now(at).each_point(Weights::NONE, &mut |point, _| visit(point));
+    }
+
+    fn law_of(self, meeting: u32) -> &'a ContactLaws {
+        &self.laws[self.pairs.contact_of(meeting as usize)]
+    }
+
+    fn acts(self, pair: &ListedPair, at: &State) -> bool {
+        at.amplitude[self.law_of(pair.meeting).amplitude] != 0.0
+    }
+
+    fn slot_of(self, pair: &ListedPair) -> Slot {
+        self.pairs.nodes_of(pair)[0][0].node.u
+    }
+
+    /// Adds forces and tangent; instance `first` is the first pair.
+    pub fn add(self, at: &State, list: &[ListedPair], weights: Weights, first: usize, out: &mut Assembler) {
+        PairsNow::new(self.pairs, self.laws, at, list).each_point(weights, &mut |point, system| {
+            if point.state.status() != Status::Open {
+                out.add(first + point.number, system);
+            }
+        });
+    }
+
+    pub fn strain_of(self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let mut largest = 0.0f64;
+        self.each(at, &mut |point| {
+            if point.state.status() == Status::Open {
+                return;
+            }
+            let nodes = self.pairs.nodes_of(&point.pair);
+            let moved = [0, 1].map(|side| {
+                let of_nodes = nodes[side].iter().zip(point.shapes[side]);
+                of_nodes.fold(Vec3::ZERO, |sum, (node, factor)| sum + field[node.node.u as usize] * factor)
+            });
+            largest = largest.max((moved[0] - moved[1]).dot(point.state.normal).abs() / length);
+        });
+        largest
+    }
+
+    /// Writes the points with a force into the memory of a state.
+    pub fn remember(self, at: &mut State, accepts: bool) {
+        let mut points = Vec::new();
+        let now = self.now(at);
+        now.each_point(Weights::NONE, &mut |point, _| {
+            if point.state.normal_force.force > 0.0 {
+                points.push(now.memory_of(point, accepts));
+            }
+        });
+        let order = |a: &PairPointMemory, b: &PairPointMemory| {
+            let places = |point: &PairPointMemory| [point.point.place, point.on_second];
+            let [a_places, b_places] = [places(a), places(b)];
+            a.meeting
+                .cmp(&b.meeting)
+                .then(a_places[0].total_cmp(&b_places[0]))
+                .then(a_places[1].total_cmp(&b_places[1]))
+        };
+        points.sort_by(order);
+        at.contacts.pairs.points = Arc::new(points);
+    }
+
+    /// Makes the list of an accepted state.
+    pub fn renew_list(self, before: &State, at: &mut State) {
+        let mut memory = at.contacts.pairs.clone();
+        self.pairs.renew_list(before, &mut memory, at);
+        at.contacts.pairs = memory;
+    }
+
+    /// Changes the memory of all points; shows them with the stiffness of their pair.
+    pub fn change_points(self, at: &mut State, change: &impl Fn(&mut PointMemory, &ContactStiffness)) {
+        let mut points = (*at.contacts.pairs.points).clone();
+        let now = self.now(at);
+        for point in &mut points {
+            let stiffness = now.stiffness_at(point.meeting as usize, point);
+            change(&mut point.point, &stiffness);
+        }
+        at.contacts.pairs.points = Arc::new(points);
+    }
+
+    /// Adds to what was found of other contacts in a balanced state.
+    pub fn survey(self, at: &State, out: &mut ContactSurvey) {
+        let mut largest = 0.0f64;
+        self.each(at, &mut |point| largest = largest.max(point.state.normal_force.force));
+        self.each(at, &mut |point| {
+            let force = point.state.normal_force.force;
+            let gap = point.state.gap;
+            out.points += usize::from(force > 0.0);
+            let is_relevant = gap < 0.0 || force > RELEVANT_FORCE * largest;
+            let violation = gap.abs() / self.law_of(point.pair.meeting).penetration;
+            if is_relevant && violation > out.violation {
+                *out = ContactSurvey { violation, gap, slot: self.slot_of(&point.pair), points: out.points };
+            }
+        });
+    }
+
+    /// The change of points with a force since the accepted state `before`.
+    pub fn change(self, before: &State, at: &State) -> ContactChange {
+        let known = &before.contacts.pairs.points;
+        let now = self.now(at);
+        let mut active = 0;
+        let mut is_other = false;
+        now.each_point(Weights::NONE, &mut |point, _| {
+            if point.state.normal_force.force > 0.0 {
+                active += 1;
+                is_other = is_other || !now.is_among(point, known);
+            }
+        });
+        if is_other || active != known.len() { ContactChange::Touches } else { ContactChange::None }
+    }
+
+    /// The deepest penetration among all listed pairs that act, if it is larger than `allowed` times
+    /// that of the deck.
+    fn deepest(self, at: &State, allowed: f64) -> Option<(ListedPair, f64)> {
+        let now = self.now(at);
+        let mut deepest: Option<(ListedPair, f64)> = None;
+        for pair in now.list.iter().filter(|pair| self.acts(pair, at)) {
+            let depth = -now.gap(pair);
+            let is_deepest = deepest.is_none_or(|(_, deepest)| depth > deepest);
+            if depth > allowed * self.law_of(pair.meeting).penetration && is_deepest {
+                deepest = Some((*pair, depth));
+            }
+        }
+        deepest
+    }
+
+    fn penetration_of(self, (pair, depth): (ListedPair, f64)) -> Penetration {
+        let laws = self.law_of(pair.meeting);
+        let second = self.pairs.meetings[pair.meeting as usize].strands[1];
+        Penetration {
+            contact: laws.name.clone(),
+            surface: self.pairs.names[second].clone(),
+            slot: self.slot_of(&pair),
+            depth,
+        }
+    }
+
+    /// The deepest penetration, if it is larger than allowed.
+    pub fn penetrates(self, at: &State) -> Option<Penetration> {
+        self.deepest(at, 1.0).map(|found| self.penetration_of(found))
+    }
+
+    /// The deepest penetration, if it exceeds the allowed one by more than augmentations leave.
+    pub fn hidden_penetration(self, at: &State) -> Option<Penetration> {
+        self.deepest(at, ROUNDED).map(|found| self.penetration_of(found))
+    }
+
+    /// A node of a pair whose centre lines may have crossed on the way.
+    pub fn passed(self, from: &State, to: &State) -> Option<Slot> {
+        let list = &from.contacts.pairs.list;
+        if list.is_empty() {
+            return None;
+        }
+        let [before, after] = [from, to].map(|at| self.pairs.places(at));
+        let passes = |pair: &&ListedPair| self.pairs.least_part(pair, &before, &after, 0.0) < 1.0;
+        list.iter().filter(|pair| self.acts(pair, to)).find(passes).map(|pair| self.slot_of(pair))
+    }
+
+    /// The part of an increment on which centre lines stay apart.
+    pub fn safe_part(self, at: &State, increment: &[Vec3]) -> f64 {
+        let list = &at.contacts.pairs.list;
+        if list.is_empty() {
+            return 1.0;
+        }
+        let before = self.pairs.places(at);
+        let nodes = self.pairs.strands.iter().flat_map(|strand| &strand.nodes);
+        let after: Vec<Vec3> = nodes.zip(&before).map(|(node, x)| *x + increment[node.node.u as usize]).collect();
+        let part = |pair: &ListedPair| self.pairs.least_part(pair, &before, &after, 0.0);
+        list.iter().filter(|pair| self.acts(pair, at)).map(part).fold(1.0, f64::min)
+    }
+
+    /// The energy of penalties in a dynamic stage.
+    pub fn energy(self, at: &State) -> f64 {
+        let mut energy = 0.0;
+        self.each(at, &mut |point| energy += point.candidate.weight * point.law.normal.energy(point.state.gap));
+        energy
+    }
+
+    /// Energy per time that damping takes: p_el c (dg/dt)^2.
+    pub fn damping_power(self, at: &State) -> f64 {
+        let mut power = 0.0;
+        self.each(at, &mut |point| {
+            let NormalLaw::Penalty { stiffness, damping, .. } = point.law.normal else { return };
+            let elastic = stiffness * (-point.state.gap).max(0.0);
+            let force = point.state.normal_force.force;
+            if elastic > 0.0 && damping > 0.0 {
+                let rate = (1.0 - force / elastic) / damping;
+                power += point.candidate.weight * (elastic - force) * rate;
+            }
+        });
+        power
+    }
+
+    /// Notes the deepest penetration and the shortest contact of a time step.
+    pub fn judge_penalty(self, at: &mut State) {
+        let known = at.contacts.pairs.points.clone();
+        let mut stays = vec![false; known.len()];
+        let mut deepest = 0.0f64;
+        self.each(at, &mut |point| {
+            let offset = point.law.radii[0] - self.pairs.both(point.pair.meeting as usize)[0].radius;
+            deepest = deepest.max(-(point.state.gap + offset) / self.law_of(point.pair.meeting).penetration);
+            if let (Some((number, _)), true) = (point.partner, point.state.normal_force.force > 0.0) {
+                stays[number] = true;
+            }
+        });
+        let ended = known.iter().zip(&stays).filter(|(_, stays)| !**stays).map(|(point, _)| point.point.steps);
+        let contacts = &mut at.contacts;
+        contacts.deepest = contacts.deepest.max(deepest);
+        contacts.shortest = contacts.shortest.into_iter().chain(ended.filter(|&steps| steps > 0)).min();
+    }
+
+    /// Adds the forces of a contact in an accepted state: on the first party, none where a beam
+    /// meets itself.
+    pub fn add_resultant(self, number: usize, at: &State, sum: &mut ContactResultant) {
+        let memory = &at.contacts.pairs;
+        sum.gap = sum.gap.min(self.pairs.least_gap_of(self, number, at));
+        for point in memory.points.iter().filter(|point| self.pairs.contact_of(point.meeting as usize) == number) {
+            let meeting = &self.pairs.meetings[point.meeting as usize];
+            let [first, _] = self.pairs.both(point.meeting as usize);
+            sum.normal += point.weight * point.point.force;
+            sum.points += 1;
+            if !meeting.is_own() {
+                sum.force += point.point.push;
+                sum.moment += point.point.at.cross(point.point.push);
+            }
+            let share = first.share(point.point.place);
+            sum.length += match point.kind {
+                PairPointKind::Closest => point.weight * share,
+                PairPointKind::NodeOfFirst => 2.0 * point.weight * share,
+                PairPointKind::NodeOfSecond => 0.0,
+            };
+        }
+    }
+
+    /// Adds the normal force per length on a beam at a part of its length, between points linear.
+    pub fn force_along(self, beam: usize, fraction: f64, at: &State) -> f64 {
+        let mut sum = 0.0;
+        for (number, strand) in self.pairs.strands.iter().enumerate().filter(|(_, strand)| strand.beam == Some(beam)) {
+            let along = strand.along(fraction);
+            let width = 1.0 / strand.order as f64;
+            for point in &*at.contacts.pairs.points {
+                let strands = self.pairs.meetings[point.meeting as usize].strands;
+                for (side, place) in [point.point.place, point.on_second].into_iter().enumerate() {
+                    let away = (place - along).abs() / width;
+                    if strands[side] == number && away < 1.0 {
+                        // A force at a point is spread over the way to its neighbours.
+                        let spread = strand.length / strand.elements() as f64 * width;
+                        sum += point.weight * point.point.force * (1.0 - away) / spread;
+                    }
+                }
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,83 @@
+//! A beam or a body in contact: its nodes, its radius, its stiffness.
+
+use crate::system::Node;
+use crate::tensor::Vec3;
+
+/// A node of a strand.
+#[derive(Clone, Copy, Debug)]
+pub struct ChainNode {
+    /// Its slots
+    pub node: Node,
+    /// Its initial place
+    pub place: Vec3,
+    /// The part of the length of the beam before it
+    pub fraction: f64,
+}
+
+/// Stiffness of contacts of an element.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactStiffness {
+    /// First stiffness of augmentations, force per length
+    pub augmented: f64,
+    /// Stiffness of the penalty in dynamic stages, force per length
+    pub penalty: f64,
+}
+
+/// A beam or a body in contact.
+#[derive(Clone, Debug)]
+pub struct Strand {
+    /// Number of the contact that it belongs to
+    pub contact: usize,
+    /// Number of the beam in the scene; `None` for a body
+    pub beam: Option<usize>,
+    /// Radius of the section, or of the sphere of a body
+    pub radius: f64,
+    /// Length of the beam; zero for a body
+    pub length: f64,
+    /// The nodes in their order; one for a body
+    pub nodes: Vec<ChainNode>,
+    /// Nodes of an element less one; zero for a body
+    pub order: usize,
+    /// Stiffness by element
+    pub stiffness: Vec<ContactStiffness>,
+    /// True if the ends are half spheres, false if they do not touch
+    pub has_caps: bool,
+}
+
+impl Strand {
+    /// The number of elements; one for a body.
+    pub fn elements(&self) -> usize {
+        self.stiffness.len()
+    }
+
+    /// Nodes of element `k`.
+    pub fn nodes_of(&self, k: usize) -> &[ChainNode] {
+        &self.nodes[k * self.order..=(k + 1) * self.order]
+    }
+
+    /// The length of the beam that a point at a place carries the force of: its element, or half of
+    /// the way to both neighbours of a node.
+    pub(super) fn share(&self, along: f64) -> f64 {
+        if self.order == 0 {
+            return 0.0;
+        }
+        let last = self.nodes.len() - 1;
+        let at = along * self.order as f64;
+        let (from, to) = if at.fract() == 0.0 {
+            let node = at as usize;
+            (node.saturating_sub(1), (node + 1).min(last))
+        } else {
+            let element = (along as usize).min(self.elements() - 1);
+            (element * self.order, (element + 1) * self.order)
+        };
+        let width = self.length * (self.nodes[to].fraction - self.nodes[from].fraction);
+        if at.fract() == 0.0 { 0.5 * width } else { width }
+    }
+
+    /// The place in elements at a part of the length of the beam.
+    pub(super) fn along(&self, fraction: f64) -> f64 {
+        let next = self.nodes.partition_point(|node| node.fraction < fraction).clamp(1, self.nodes.len() - 1);
+        let [from, to] = [self.nodes[next - 1].fraction, self.nodes[next].fraction];
+        (next as f64 - 1.0 + (fraction - from) / (to - from)) / self.order as f64
+    }
+}

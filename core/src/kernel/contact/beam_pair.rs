@@ -1,0 +1,513 @@
+//! Contact of two beams, or of a beam with itself: forces and tangent of one pair of points.
+//!
+//! Point A lies at s on one element, point B at e on the other; D = x_A - x_B, l = |D|, n = D/l
+//! points from B to A, and the gap is g = l - r_A - r_B. A node j of B, the one nearest to e at the
+//! last converged state, carries the pair: with its rotation Q
+//!
+//! ```text
+//! y = Q^T D,  m = y/l,  H = (I - mm)/l,  dy = Q^T dD + y~ w,  w = T_j dP_j
+//! arms       a_A = r_A + g/2,  a_B = r_B + g/2
+//! rolling    Theta = a_A theta_A + a_B theta_B
+//! sliding    a = y - y0 - Theta x m,   da = dy - dy0 + m~ dTheta - Theta~ H dy
+//! ```
+//!
+//! With F = p m + t (force on A), internal forces are
+//!
+//! ```text
+//! f_x_A = -N_A Q F            f_x_B = N_B Q F
+//! f_P_A = N_A T^T S^T a_A (m x t)     f_P_B = N_B T^T S^T a_B (m x t),   S = Q^T R
+//! ```
+//!
+//! Free parameters, any of s and e, are those of the closest points. With z_A = Q^T x_A', z_B = Q^T
+//! x_B' and F_s = m.z_A = 0, F_e = -m.z_B = 0:
+//!
+//! ```text
+//! F_ss = z_A.H z_A + n.x_A''    F_se = -z_A.H z_B    F_ee = z_B.H z_B - n.x_B''
+//! F_s over x_A: Q (H z_A N_A + m N_A')    over x_B: -Q H z_A N_B
+//! F_e over x_A: -Q H z_B N_A              over x_B: Q (H z_B N_B - m N_B')
+//! K = f_q - f_s F_ss^-1 F_sq
+//! ```
+//!
+//! Without friction and damping K is symmetric:
+//!
+//! ```text
+//! K = -p_g (N^T n)(N^T n)^T - p [N^T H N - F_qs F_ss^-1 F_sq],   N = [N_A, -N_B]
+//! ```
+
+use super::along::{ShapeAt, weighted_sum};
+use super::friction::{CarriedTraction, FrictionLaw, Status, Traction};
+use super::law::NormalLaw;
+use super::point::PointState;
+use super::variation::{Change, Column, ContactNode, Derived, Turned};
+use crate::kernel::element::{ElementSystem, MAX_NODES, Weights};
+use crate::scalar::Real;
+use crate::tensor::{Mat3, Vec3};
+
+/// One of the two elements of a pair.
+#[derive(Clone, Copy, Debug)]
+pub struct PairSide<const N: usize, T = f64> {
+    /// The nodes; their states before are seen from the carrier of the pair
+    pub nodes: [ContactNode<T>; N],
+    /// The shape functions at the point
+    pub shape: ShapeAt<N, T>,
+}
+
+impl<const N: usize, T: Real> PairSide<N, T> {
+    /// x at the point.
+    pub fn place(&self) -> Vec3<T> {
+        weighted_sum(&self.shape.values, |i| self.nodes[i].place)
+    }
+
+    /// x' at the point.
+    fn tangent(&self) -> Vec3<T> {
+        weighted_sum(&self.shape.slopes, |i| self.nodes[i].place)
+    }
+
+    /// x'' at the point.
+    fn bend(&self) -> Vec3<T> {
+        weighted_sum(&self.shape.bends, |i| self.nodes[i].place)
+    }
+}
+
+/// The laws of a pair of points, and its memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairLaw {
+    /// r_A and r_B, radii of the sections
+    pub radii: [f64; 2],
+    /// The normal force
+    pub normal: NormalLaw,
+    /// Friction; `None` without
+    pub friction: Option<FrictionLaw>,
+    /// The traction on A at the last converged state, in the axes of the carrier
+    pub carried: CarriedTraction,
+    /// j, the node of B whose rotation carries the pair
+    pub carrier: usize,
+    /// True for parameters s of A and e of B that are those of the closest points; others stay
+    pub free: [bool; 2],
+    /// Part of the force that this pair stands for: the weight of a rule, or of a blend. Frozen in a
+    /// step.
+    pub weight: f64,
+}
+
+/// The largest number of blocks of a pair: two elements.
+const MAX_BLOCKS: usize = 4 * MAX_NODES;
+
+/// A vector for each block of a pair.
+type ByBlock<T> = [Vec3<T>; MAX_BLOCKS];
+
+/// Adds the forces of a pair of points to `out`, and the tangent of the weights: blocks x_1, P_1, …
+/// of A, then those of B. `None` if the centre lines meet, where there is no normal.
+pub fn add_pair<const NA: usize, const NB: usize, T: Real>(
+    a: &PairSide<NA, T>,
+    b: &PairSide<NB, T>,
+    law: &PairLaw,
+    weights: Weights,
+    out: &mut ElementSystem<T>,
+) -> Option<PointState<T>> {
+    let q = b.nodes[law.carrier].rotation.r;
+    let place = q.transpose_mul(a.place() - b.place());
+    let length = place.norm();
+    if length.largest() <= 0.0 || length.largest().is_nan() {
+        return None;
+    }
+    let inverse = T::one() / length;
+    let normal = place * inverse;
+    let curvature = (Mat3::identity() - normal.outer(normal)) * inverse;
+    let moves = |i: usize| a.nodes[i].velocity;
+    let carries = |k: usize| b.nodes[k].velocity;
+    let rate = q.transpose_mul(weighted_sum(&a.shape.values, moves) - weighted_sum(&b.shape.values, carries));
+    let gap = length - T::constant(law.radii[0] + law.radii[1]);
+    let normal_force = law.normal.force(gap, normal.dot(rate));
+    let mut state = PointState { gap, normal_force, normal, traction: Traction::none() };
+    if state.status() == Status::Open {
+        return Some(state);
+    }
+    let arms = law.radii.map(|radius| T::constant(radius) + gap * 0.5);
+    let turned = law.friction.map(|_| (Turned::new(&a.nodes, &a.shape, &q), Turned::new(&b.nodes, &b.shape, &q)));
+    let mut rolling = Vec3::zero();
+    let mut angles = Vec3::zero();
+    if let (Some(friction), Some((turned_a, turned_b))) = (&law.friction, &turned) {
+        let before = weighted_sum(&a.shape.values, |i| Vec3::constant(a.nodes[i].before.place))
+            - weighted_sum(&b.shape.values, |k| Vec3::constant(b.nodes[k].before.place));
+        angles = turned_a.angle + turned_b.angle;
+        rolling = turned_a.angle * arms[0] + turned_b.angle * arms[1];
+        let sliding = place - before - rolling.cross(normal);
+        state.traction = friction.traction(&law.carried, normal, normal_force.force, sliding);
+    }
+    let pair = Pair { a, b, law, q, place, normal, curvature, rate, arms, turned, angles, rolling, state: &state };
+    pair.add(weights, out);
+    Some(state)
+}
+
+/// A pair of points with a force.
+struct Pair<'a, const NA: usize, const NB: usize, T> {
+    a: &'a PairSide<NA, T>,
+    b: &'a PairSide<NB, T>,
+    law: &'a PairLaw,
+    /// Q
+    q: Mat3<T>,
+    /// y
+    place: Vec3<T>,
+    /// m
+    normal: Vec3<T>,
+    /// H
+    curvature: Mat3<T>,
+    /// Q^T dD/dt
+    rate: Vec3<T>,
+    /// a_A and a_B
+    arms: [T; 2],
+    turned: Option<(Turned<NA, T>, Turned<NB, T>)>,
+    /// theta_A + theta_B
+    angles: Vec3<T>,
+    /// Theta
+    rolling: Vec3<T>,
+    state: &'a PointState<T>,
+}
+
+/// The force on A, and the moments on A and B about their centre lines.
+struct Loads<T> {
+    /// F
+    force: Derived<T>,
+    /// a_A (m x t) and a_B (m x t)
+    moments: [Derived<T>; 2],
+}
+
+/// Changes of the loads, and of the shape functions that distribute them.
+struct LoadChange<'a, const NA: usize, const NB: usize, T> {
+    force: Vec3<T>,
+    moments: [Vec3<T>; 2],
+    /// Factors of A and B
+    factors: (&'a [T; NA], &'a [T; NB]),
+}
+
+impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
+    const BLOCKS: usize = 2 * (NA + NB);
+
+    fn add(&self, weights: Weights, out: &mut ElementSystem<T>) {
+        let loads = self.loads();
+        let values = (&self.a.shape.values, &self.b.shape.values);
+        let moments = [loads.moments[0].value, loads.moments[1].value];
+        let mut forces = [Vec3::zero(); MAX_BLOCKS];
+        self.distribute(&LoadChange { force: loads.force.value, moments, factors: values }, &mut forces);
+        for block in 0..Self::BLOCKS {
+            out.add_force(block, forces[block]);
+        }
+        if weights.stiffness == 0.0 && weights.damping == 0.0 {
+            return;
+        }
+        self.add_columns(&loads, weights, out);
+        if self.turned.is_some() {
+            self.add_geometric(&loads, weights.stiffness, out);
+        }
+        self.add_moving(&loads, weights.stiffness, out);
+    }
+
+    /// F and the moments.
+    fn loads(&self) -> Loads<T> {
+        let t = &self.state.traction;
+        let m = self.normal;
+        let p = self.state.normal_force.force;
+        let weight = self.law.weight;
+        let half = m.scale(0.5);
+        let slides = Mat3::identity() - Mat3::skew_mul(self.rolling, self.curvature)
+            + Mat3::skew_mul(m, self.angles.outer(half));
+        let friction = Derived {
+            value: t.force.scale(weight),
+            over_place: (t.over_sliding * slides + t.over_normal * self.curvature).scale(weight),
+            over_rolling: (t.over_sliding * m.skew()).scale(weight),
+            over_before: -t.over_sliding.scale(weight),
+            over_pressure: t.over_pressure.scale(weight),
+        };
+        let lever = m.cross(friction.value);
+        let lever_over_place = Mat3::skew_mul(m, friction.over_place) - Mat3::skew_mul(friction.value, self.curvature);
+        let moments = self.arms.map(|arm| Derived {
+            value: lever * arm,
+            over_place: lever_over_place * arm + lever.outer(half),
+            over_rolling: Mat3::skew_mul(m, friction.over_rolling) * arm,
+            over_before: Mat3::skew_mul(m, friction.over_before) * arm,
+            over_pressure: m.cross(friction.over_pressure) * arm,
+        });
+        let force = Derived {
+            value: (m * p).scale(weight) + friction.value,
+            over_place: (self.curvature * p).scale(weight) + friction.over_place,
+            over_pressure: m.scale(weight) + friction.over_pressure,
+            ..friction
+        };
+        Loads { force, moments }
+    }
+
+    /// The derivative of p over D (axes of the carrier), through the gap and its rate.
+    fn pressure_over_place(&self) -> Vec3<T> {
+        let force = &self.state.normal_force;
+        self.normal * force.over_gap + self.curvature * self.rate * force.over_rate
+    }
+
+    /// Forces on the nodes from loads.
+    fn distribute(&self, loads: &LoadChange<'_, NA, NB, T>, forces: &mut ByBlock<T>) {
+        let spatial = self.q * loads.force;
+        let (on_a, on_b) = loads.factors;
+        for i in 0..NA {
+            forces[2 * i] += -spatial * on_a[i];
+        }
+        for k in 0..NB {
+            forces[2 * (NA + k)] += spatial * on_b[k];
+        }
+        let Some((turned_a, turned_b)) = &self.turned else { return };
+        for i in 0..NA {
+            let material = turned_a.rotations[i].transpose_mul(loads.moments[0]);
+            forces[2 * i + 1] += self.a.nodes[i].rotation.t.transpose_mul(material) * on_a[i];
+        }
+        for k in 0..NB {
+            let material = turned_b.rotations[k].transpose_mul(loads.moments[1]);
+            forces[2 * (NA + k) + 1] += self.b.nodes[k].rotation.t.transpose_mul(material) * on_b[k];
+        }
+    }
+
+    /// The block of the rotation of the carrier.
+    fn carrier(&self) -> usize {
+        2 * (NA + self.law.carrier) + 1
+    }
+
+    /// Adds the derivatives of F and of the moments, without those of Q, T and S.
+    fn add_columns(&self, loads: &Loads<T>, weights: Weights, out: &mut ElementSystem<T>) {
+        for i in 0..NA {
+            self.add_column(2 * i, &self.displacement(self.a.shape.values[i], weights), loads, out);
+        }
+        for k in 0..NB {
+            self.add_column(2 * (NA + k), &self.displacement(-self.b.shape.values[k], weights), loads, out);
+        }
+        let Some((turned_a, turned_b)) = &self.turned else { return };
+        let column = |rolling: Mat3<T>| Column {
+            place: Mat3::zero(),
+            rolling: rolling.scale(weights.stiffness),
+            pressure: Vec3::zero(),
+        };
+        for i in 0..NA {
+            let spun = turned_a.maps[i] * (turned_a.rotations[i] * self.a.nodes[i].rotation.t);
+            let rolling = spun * (self.a.shape.values[i] * self.arms[0]);
+            self.add_column(2 * i + 1, &column(rolling), loads, out);
+        }
+        for k in 0..NB {
+            let spun = turned_b.maps[k] * (turned_b.rotations[k] * self.b.nodes[k].rotation.t);
+            let rolling = spun * (self.b.shape.values[k] * self.arms[1]);
+            self.add_column(2 * (NA + k) + 1, &column(rolling), loads, out);
+        }
+        self.add_column(self.carrier(), &self.carrier_rotation(weights), loads, out);
+    }
+
+    /// The column of a displacement that moves D by `factor` times itself.
+    fn displacement(&self, factor: T, weights: Weights) -> Column<T> {
+        let moved = self.q.transpose() * factor;
+        let by_rate = self.normal * self.state.normal_force.over_rate;
+        let pressure = self.pressure_over_place().scale(weights.stiffness) + by_rate.scale(weights.damping);
+        Column { place: moved.scale(weights.stiffness), rolling: Mat3::zero(), pressure: moved.transpose() * pressure }
+    }
+
+    /// The column of the rotation of the carrier, at constant spatial D and rotations of the nodes:
+    /// it changes neither the gap nor its rate.
+    fn carrier_rotation(&self, weights: Weights) -> Column<T> {
+        let t = self.b.nodes[self.law.carrier].rotation.t.scale(weights.stiffness);
+        let mut rolling = Mat3::zero();
+        if let Some((turned_a, turned_b)) = &self.turned {
+            for i in 0..NA {
+                rolling -= turned_a.maps[i] * t * (self.a.shape.values[i] * self.arms[0]);
+            }
+            for k in 0..NB {
+                rolling -= turned_b.maps[k] * t * (self.b.shape.values[k] * self.arms[1]);
+            }
+        }
+        Column { place: Mat3::skew_mul(self.place, t), rolling, pressure: Vec3::zero() }
+    }
+
+    fn add_column(&self, block: usize, column: &Column<T>, loads: &Loads<T>, out: &mut ElementSystem<T>) {
+        let spatial = self.q * loads.force.over(column);
+        for i in 0..NA {
+            out.add_tangent(2 * i, block, -spatial * self.a.shape.values[i]);
+        }
+        for k in 0..NB {
+            out.add_tangent(2 * (NA + k), block, spatial * self.b.shape.values[k]);
+        }
+        let Some((turned_a, turned_b)) = &self.turned else { return };
+        let moments = [loads.moments[0].over(column), loads.moments[1].over(column)];
+        for i in 0..NA {
+            let material = turned_a.rotations[i].transpose_matmul(moments[0]);
+            let row = self.a.nodes[i].rotation.t.transpose_matmul(material) * self.a.shape.values[i];
+            out.add_tangent(2 * i + 1, block, row);
+        }
+        for k in 0..NB {
+            let material = turned_b.rotations[k].transpose_matmul(moments[1]);
+            let row = self.b.nodes[k].rotation.t.transpose_matmul(material) * self.b.shape.values[k];
+            out.add_tangent(2 * (NA + k) + 1, block, row);
+        }
+    }
+
+    /// Adds the derivatives of Q, T and S at constant loads.
+    fn add_geometric(&self, loads: &Loads<T>, weight: f64, out: &mut ElementSystem<T>) {
+        let Some((turned_a, turned_b)) = &self.turned else { return };
+        let carried = self.b.nodes[self.law.carrier].rotation.t.scale(weight);
+        let turned = self.q * Mat3::skew_mul(loads.force.value, carried);
+        for i in 0..NA {
+            out.add_tangent(2 * i, self.carrier(), turned * self.a.shape.values[i]);
+        }
+        for k in 0..NB {
+            out.add_tangent(2 * (NA + k), self.carrier(), -(turned * self.b.shape.values[k]));
+        }
+        for i in 0..NA {
+            let side = (&self.a.nodes[i], &turned_a.rotations[i], self.a.shape.values[i]);
+            self.add_spin(2 * i + 1, side, loads.moments[0].value, weight, out);
+        }
+        for k in 0..NB {
+            let side = (&self.b.nodes[k], &turned_b.rotations[k], self.b.shape.values[k]);
+            self.add_spin(2 * (NA + k) + 1, side, loads.moments[1].value, weight, out);
+        }
+    }
+
+    /// Adds the derivatives of T and S of one node at a constant moment.
+    fn add_spin(
+        &self,
+        block: usize,
+        (node, s, factor): (&ContactNode<T>, &Mat3<T>, T),
+        moment: Vec3<T>,
+        weight: f64,
+        out: &mut ElementSystem<T>,
+    ) {
+        let carried = self.b.nodes[self.law.carrier].rotation.t;
+        let factor = factor * weight;
+        let t = node.rotation.t;
+        let back = t.transpose() * s.transpose() * factor;
+        let own = back * Mat3::skew_mul(moment, *s * t) + node.rotation.c2(s.transpose_mul(moment)) * factor;
+        out.add_tangent(block, block, own);
+        out.add_tangent(block, self.carrier(), -(back * Mat3::skew_mul(moment, carried)));
+    }
+
+    /// Adds -f_s F_ss^-1 F_sq for the free parameters, unless F_ss is not positive definite.
+    fn add_moving(&self, loads: &Loads<T>, weight: f64, out: &mut ElementSystem<T>) {
+        let inverse = match invert(self.second_derivatives(), self.law.free) {
+            Some(inverse) => inverse,
+            None => return,
+        };
+        let forces = [self.along_a(loads), self.along_b(loads)];
+        let gradients = [self.gradient_of_s(), self.gradient_of_e()];
+        for (i, force) in forces.iter().enumerate() {
+            for (j, gradient) in gradients.iter().enumerate() {
+                if !(self.law.free[i] && self.law.free[j]) {
+                    continue;
+                }
+                let factor = inverse[i][j] * -weight;
+                for row in 0..Self::BLOCKS {
+                    let scaled = force[row] * factor;
+                    // F depends on displacements alone.
+                    for column in (0..Self::BLOCKS).step_by(2) {
+                        out.add_tangent(row, column, scaled.outer(gradient[column]));
+                    }
+                }
+            }
+        }
+    }
+
+    /// z_A and z_B
+    fn tangents(&self) -> [Vec3<T>; 2] {
+        [self.q.transpose_mul(self.a.tangent()), self.q.transpose_mul(self.b.tangent())]
+    }
+
+    /// F_ss, F_se; F_se, F_ee
+    fn second_derivatives(&self) -> [[T; 2]; 2] {
+        let [za, zb] = self.tangents();
+        let spatial = self.q * self.normal;
+        let mixed = -za.dot(self.curvature * zb);
+        [
+            [za.dot(self.curvature * za) + spatial.dot(self.a.bend()), mixed],
+            [mixed, zb.dot(self.curvature * zb) - spatial.dot(self.b.bend())],
+        ]
+    }
+
+    /// F_s over the displacements.
+    fn gradient_of_s(&self) -> ByBlock<T> {
+        let bent = self.q * (self.curvature * self.tangents()[0]);
+        let n = self.q * self.normal;
+        let mut out = [Vec3::zero(); MAX_BLOCKS];
+        for i in 0..NA {
+            out[2 * i] = bent * self.a.shape.values[i] + n * self.a.shape.slopes[i];
+        }
+        for k in 0..NB {
+            out[2 * (NA + k)] = -bent * self.b.shape.values[k];
+        }
+        out
+    }
+
+    /// F_e over the displacements.
+    fn gradient_of_e(&self) -> ByBlock<T> {
+        let bent = self.q * (self.curvature * self.tangents()[1]);
+        let n = self.q * self.normal;
+        let mut out = [Vec3::zero(); MAX_BLOCKS];
+        for i in 0..NA {
+            out[2 * i] = -bent * self.a.shape.values[i];
+        }
+        for k in 0..NB {
+            out[2 * (NA + k)] = bent * self.b.shape.values[k] - n * self.b.shape.slopes[k];
+        }
+        out
+    }
+
+    /// f_s, the derivatives of the forces over s.
+    fn along_a(&self, loads: &Loads<T>) -> ByBlock<T> {
+        let shape = &self.a.shape;
+        let z = self.tangents()[0];
+        let faster = self.q.transpose_mul(weighted_sum(&shape.slopes, |i| self.a.nodes[i].velocity));
+        let angles = |i: usize| self.turned.as_ref().map_or(Vec3::zero(), |(a, _)| a.angles[i]);
+        let change = Change {
+            place: z,
+            rolling: weighted_sum(&shape.slopes, angles) * self.arms[0],
+            before: weighted_sum(&shape.slopes, |i| Vec3::constant(self.a.nodes[i].before.place)),
+            pressure: self.pressure_over_place().dot(z) + self.normal.dot(faster) * self.state.normal_force.over_rate,
+        };
+        self.along(loads, &change, (&shape.slopes, &[T::zero(); NB]))
+    }
+
+    /// f_e, the derivatives of the forces over e.
+    fn along_b(&self, loads: &Loads<T>) -> ByBlock<T> {
+        let shape = &self.b.shape;
+        let z = self.tangents()[1];
+        let faster = self.q.transpose_mul(weighted_sum(&shape.slopes, |k| self.b.nodes[k].velocity));
+        let angles = |k: usize| self.turned.as_ref().map_or(Vec3::zero(), |(_, b)| b.angles[k]);
+        let change = Change {
+            place: -z,
+            rolling: weighted_sum(&shape.slopes, angles) * self.arms[1],
+            before: -weighted_sum(&shape.slopes, |k| Vec3::constant(self.b.nodes[k].before.place)),
+            pressure: -(self.pressure_over_place().dot(z)
+                + self.normal.dot(faster) * self.state.normal_force.over_rate),
+        };
+        self.along(loads, &change, (&[T::zero(); NA], &shape.slopes))
+    }
+
+    /// The derivatives of the forces for a change of what loads depend on, and `slopes` of the shape
+    /// functions.
+    fn along(&self, loads: &Loads<T>, change: &Change<T>, slopes: (&[T; NA], &[T; NB])) -> ByBlock<T> {
+        let mut out = [Vec3::zero(); MAX_BLOCKS];
+        let values = (&self.a.shape.values, &self.b.shape.values);
+        let moments = [loads.moments[0].by(change), loads.moments[1].by(change)];
+        self.distribute(&LoadChange { force: loads.force.by(change), moments, factors: values }, &mut out);
+        let moments = [loads.moments[0].value, loads.moments[1].value];
+        self.distribute(&LoadChange { force: loads.force.value, moments, factors: slopes }, &mut out);
+        out
+    }
+}
+
+/// The inverse of a symmetric 2x2 matrix on the free parameters; `None` without a free one, or if
+/// it is not positive definite.
+fn invert<T: Real>(m: [[T; 2]; 2], free: [bool; 2]) -> Option<[[T; 2]; 2]> {
+    let one = T::one();
+    let zero = T::zero();
+    let positive = |value: T| value.largest() > 0.0;
+    match free {
+        [false, false] => None,
+        [true, false] => positive(m[0][0]).then(|| [[one / m[0][0], zero], [zero; 2]]),
+        [false, true] => positive(m[1][1]).then(|| [[zero; 2], [zero, one / m[1][1]]]),
+        [true, true] => {
+            let determinant = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+            let inverse = one / determinant;
+            let definite = positive(m[0][0]) && positive(determinant);
+            definite.then(|| [[m[1][1] * inverse, -m[0][1] * inverse], [-m[1][0] * inverse, m[0][0] * inverse]])
+        }
+    }
+}

@@ -1,0 +1,337 @@
+//! Contact of beams with beams, and with themselves, in whole scenes.
+
+use crate::random::Random;
+use crate::scenes::{Simulation, attempt, simulate};
+use beamsim::scene;
+use beamsim_core::failure::FailureKind;
+use beamsim_core::kernel::Weights;
+use beamsim_core::model::beam_element::PlacedNode;
+use beamsim_core::model::{Assembly, Schedule, StageKind};
+use beamsim_core::system::ContactRegime;
+use beamsim_core::tensor::Vec3;
+
+/// A beam from one place to another.
+struct Bar {
+    ends: [Vec3; 2],
+    elements: usize,
+    order: usize,
+    radius: f64,
+}
+
+impl Bar {
+    fn deck(&self, name: &str) -> String {
+        let [[ax, ay, az], [bx, by, bz]] = self.ends.map(|end| end.0);
+        format!(
+            "[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = [[{ax}, {ay}, {az}], [{bx}, {by}, {bz}]]\n\
+             elements = {}\norder = {}\n",
+            self.elements, self.order
+        )
+    }
+}
+
+/// Two bars whose ends are held; those of the second are moved by `way` in static stages.
+fn pushed(first: &Bar, second: &Bar, way: Vec3, steps: usize) -> String {
+    let held = |at: &str| format!("[[support]]\nat = \"{at}\"\nfix = [\"ux\", \"uy\", \"uz\"]\n");
+    let moved = |at: &str| {
+        ["ux", "uy", "uz"]
+            .iter()
+            .zip(way.0)
+            .map(|(key, value)| format!("[[motion]]\nat = \"{at}\"\n{key} = {value}\n"))
+            .collect::<String>()
+    };
+    let twist = |name: &str| format!("[[spring]]\nat = \"{name}@0\"\nstiffness = [0, 0, 0, 1, 1, 1]\n");
+    [
+        "[section.s]\nEA = 200\nGA = 100\nGJ = 1\nEI = 1\n".to_string(),
+        first.deck("first"),
+        second.deck("second"),
+        ["first@start", "first@end"].map(held).concat(),
+        ["second@start", "second@end"].map(moved).concat(),
+        ["first", "second"].map(twist).concat(),
+        format!(
+            "[[contact]]\nname = \"c\"\nbeams = [\"first\"]\nwith = [\"second\"]\n\
+             radius = {{ first = {}, second = {} }}\n",
+            first.radius, second.radius
+        ),
+        format!("[[stage]]\nkind = \"static\"\nsteps = {steps}\n"),
+        "[output]\nnodes = [\"first@start\", \"first@end\"]\ncolumns = [\"reaction\", \"contact\", \"energy\"]\n"
+            .into(),
+    ]
+    .concat()
+}
+
+/// A pair of bars that cross at a random angle, the second one beyond the first by a random gap.
+struct Crossing {
+    bars: [Bar; 2],
+    normal: Vec3,
+}
+
+fn crossing(random: &mut Random, angles: [f64; 2]) -> Crossing {
+    let along = random.direction();
+    let normal = along.cross(random.direction()).normalized().unwrap();
+    let angle = random.range(angles[0], angles[1]).to_radians();
+    let across = along * angle.cos() + normal.cross(along) * angle.sin();
+    let radii = [0, 1].map(|_| random.range(0.01, 0.04));
+    let gap = random.range(0.001, 0.05);
+    let bar = |random: &mut Random, direction: Vec3, middle: Vec3, radius: f64| {
+        let part = random.range(0.35, 0.65);
+        let elements = random.range(4.0, 24.99) as usize;
+        let order = random.range(1.0, 3.99) as usize;
+        Bar {
+            ends: [middle - direction * part, middle + direction * (1.0 - part)],
+            elements: elements.div_ceil(order).max(2),
+            order,
+            radius,
+        }
+    };
+    let first = bar(random, along, Vec3::ZERO, radii[0]);
+    let second = bar(random, across, normal * (radii[0] + radii[1] + gap), radii[1]);
+    Crossing { bars: [first, second], normal }
+}
+
+#[test]
+fn bars_that_are_pushed_do_not_pass_through_each_other() {
+    let mut random = Random::new(81);
+    let mut failed = Vec::new();
+    const COUNT: usize = 60;
+    for case in 0..COUNT {
+        let Crossing { bars: [first, second], normal } = crossing(&mut random, [25.0, 90.0]);
+        let steps = random.range(1.0, 12.99) as usize;
+        let text = pushed(&first, &second, normal * -0.2, steps);
+        let simulation = attempt(&text);
+        if let Err(failure) = &simulation.result {
+            println!("case {case}: {failure}");
+            failed.push(case);
+            continue;
+        }
+        let force = force_on_first(&simulation);
+        assert!(force.dot(normal) < -0.01, "case {case}: {force:?}, {normal:?}\n{text}");
+        assert!(simulation.end("c.depth") < 1.01e-3 * second.radius.min(first.radius), "case {case}");
+        balances(&simulation, force);
+    }
+    println!("{} of {COUNT} fail: {failed:?}", failed.len());
+    assert!(failed.len() * 20 <= COUNT, "{failed:?}");
+}
+
+fn force_on_first(simulation: &Simulation) -> Vec3 {
+    Vec3(simulation.vector("c.f"))
+}
+
+fn balances(simulation: &Simulation, force: Vec3) {
+    let reactions = ["first@start.f", "first@end.f"].map(|prefix| Vec3(simulation.vector(prefix)));
+    let sum = force + reactions[0] + reactions[1];
+    assert!(sum.norm() < 1e-5 * reactions[0].norm().max(force.norm()), "{sum:?} of {force:?}");
+}
+
+#[test]
+fn the_answer_does_not_depend_on_levels_and_stiffness() {
+    let mut random = Random::new(82);
+    let Crossing { bars: [first, second], normal } = crossing(&mut random, [60.0, 61.0]);
+    let force = |steps: usize, stiffness: &str| {
+        let text = pushed(&first, &second, normal * -0.1, steps);
+        let contact = format!("name = \"c\"\n{stiffness}\npenetration = 1e-8");
+        simulate(&text.replace("name = \"c\"", &contact)).end("c.normal")
+    };
+    let forces = [force(1, ""), force(10, ""), force(4, "stiffness = 1e3"), force(4, "stiffness = 1e5")];
+    println!("{forces:?}");
+    assert!(forces.iter().all(|other| (other / forces[0] - 1.0).abs() < 1e-5), "{forces:?}");
+}
+
+/// A scene whose beams do not meet is the same with contact and without, to the last bit.
+#[test]
+fn beams_that_never_meet_change_nothing() {
+    let mut random = Random::new(83);
+    let Crossing { bars: [first, second], normal } = crossing(&mut random, [60.0, 61.0]);
+    let far = Bar { ends: second.ends.map(|end| end + normal), ..second };
+    let text = pushed(&first, &far, normal * 0.2, 5);
+    let text = text.replace("columns = [\"reaction\", \"contact\", \"energy\"]", "");
+    let start = text.find("[[contact]]").unwrap();
+    let end = text.find("[[stage]]").unwrap();
+    let without = text[..start].to_string() + &text[end..];
+    let [with, without] = [text, without].map(|text| simulate(&text));
+    assert_eq!(with.rows, without.rows);
+    assert_eq!(with.counters.work.iterations, without.counters.work.iterations);
+    assert_eq!(with.counters.work.factorisations, without.counters.work.factorisations);
+    let of = |simulation: &Simulation| {
+        let counts = simulation.counters.evaluations.iter().filter(|(name, _)| *name != "contact");
+        counts.copied().collect::<Vec<_>>()
+    };
+    assert_eq!(of(&with), of(&without));
+}
+
+/// Beams side by side: a strip on a strip that is held, pressed by a load per length.
+#[test]
+fn beams_side_by_side_carry_a_load_per_length() {
+    for angle in [0.0f64, 4.0, 14.0] {
+        let (c, s) = (angle.to_radians().cos(), angle.to_radians().sin());
+        let text = format!(
+            r#"
+[section.s]
+EA = 1000
+GA = 1000
+GJ = 1
+EI = 1
+[[beam]]
+name = "upper"
+section = "s"
+through = [[0, 0, 0.021], [{c}, {s}, 0.021]]
+elements = 10
+[[beam]]
+name = "lower"
+section = "s"
+through = [[0, 0, 0], [1, 0, 0]]
+elements = 13
+[[support]]
+at = "lower@start"
+fix = "all"
+[[support]]
+at = "lower@end"
+fix = "all"
+[[support]]
+at = "upper@start"
+fix = ["ux", "uy", "rx", "ry", "rz"]
+[[support]]
+at = "upper@end"
+fix = ["ux", "uy", "rx", "ry", "rz"]
+[[spring]]
+at = "upper@start"
+stiffness = [0, 0, 0.01, 0, 0, 0]
+[[load]]
+along = "upper"
+force = [0, 0, -0.5]
+[[contact]]
+name = "c"
+beams = ["upper"]
+with = ["lower"]
+radius = 0.01
+[[stage]]
+kind = "static"
+steps = 4
+[output]
+nodes = ["upper@start", "upper@end"]
+columns = ["u", "contact"]
+"#
+        );
+        let simulation = simulate(&text);
+        let held = 0.01 * -simulation.end("upper@start.uz");
+        let force = simulation.end("c.fz");
+        println!("{angle}: {force}, points {}", simulation.end("c.points"));
+        assert!((force + held - 0.5).abs() < 1e-4, "{angle}: {force} {held}");
+    }
+}
+
+#[test]
+fn forces_and_moments_of_pairs_cancel_and_have_their_tangent() {
+    let mut random = Random::new(84);
+    let mut touched = 0;
+    for case in 0..40 {
+        let angles = [[25.0, 90.0], [0.0, 9.0], [10.0, 20.0]][case % 3];
+        let Crossing { bars: [first, second], normal } = crossing(&mut random, angles);
+        let text = pushed(&first, &second, normal * -0.1, 1).replace("name = \"c\"", "name = \"c\"\nstiffness = 3");
+        let (scene, _) = scene::from_text(&text).unwrap();
+        let model = scene.plan.model;
+        let mut state = model.rest();
+        let mut schedule = Schedule::new(&model);
+        let dof_map = schedule.begin_stage(&model, 0, StageKind::Static, &state).unwrap();
+        schedule.set_clock(&model, &mut state, 0.0, 0.0);
+        let contacts = model.contacts().unwrap();
+        contacts.list_pairs(&mut state);
+        state.contacts.regime = ContactRegime::Penalty;
+        // The second bar goes into the first.
+        let depth = second.ends[0].dot(normal) - 0.7 * (first.radius + second.radius);
+        for &node in &scene.mesh.beams[1].nodes {
+            state.q[scene.mesh.nodes[node].node.u as usize] = normal * -depth + random.cube(0.001);
+        }
+        let effect = model.effects.iter().find(|effect| effect.name() == "contact").unwrap().clone();
+        let pairs = state.contacts.pairs.list.clone();
+        let stage = scene.plan.stages[0].context(0);
+        let mut assembly = Assembly::of(vec![effect], &stage, dof_map, &model, pairs);
+        assembly.evaluate(&state, Weights::STIFFNESS, None);
+        let of_node = |node: &PlacedNode| {
+            let slot = node.node.u as usize;
+            let force = assembly.system.total(slot);
+            (force, (node.place + state.q[slot]).cross(force))
+        };
+        let all: Vec<(Vec3, Vec3)> = scene.mesh.nodes.iter().map(of_node).collect();
+        let sum = all.iter().fold(Vec3::ZERO, |sum, (force, _)| sum + *force);
+        let moment = all.iter().fold(Vec3::ZERO, |sum, (_, moment)| sum + *moment);
+        let size = all.iter().map(|(force, _)| force.norm()).fold(0.0, f64::max);
+        touched += usize::from(size > 0.0);
+        assert!(sum.norm() <= 1e-14 * size && moment.norm() <= 1e-14 * size, "{case}: {sum:?} {moment:?} of {size}");
+        let count = assembly.system.pattern.dof_map.count();
+        let x: Vec<f64> = (0..count).map(|_| random.range(-1.0, 1.0)).collect();
+        let values = assembly.system.values.clone();
+        let got = assembly.system.multiply(&values, &x);
+        let mut moved = |h: f64| {
+            let mut there = state.clone();
+            let mut dq = vec![Vec3::ZERO; there.q.len()];
+            assembly.system.pattern.dof_map.scatter(&x, None, &mut dq);
+            there.q.iter_mut().zip(&dq).for_each(|(q, dq)| *q += *dq * h);
+            assembly.evaluate(&there, Weights::NONE, None);
+            let mut out = vec![0.0; count];
+            assembly.system.right_hand_side(&mut out);
+            out
+        };
+        let h = 1e-7;
+        let (after, before) = (moved(h), moved(-h));
+        let exact: Vec<f64> = after.iter().zip(&before).map(|(a, b)| (b - a) / (2.0 * h)).collect();
+        let scale = exact.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let off = got.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off <= 1e-6 * scale, "{case}: {off} of {scale}");
+    }
+    println!("{touched} of 40 touch");
+    assert!(touched > 30);
+}
+
+/// A bar that is held at its ends, and one that flies at it.
+fn shot(first: &Bar, second: &Bar, velocity: Vec3, step: f64, end: f64) -> String {
+    let [x, y, z] = velocity.0;
+    let text = pushed(first, second, Vec3::ZERO, 1);
+    let without_motions: Vec<&str> = text.split("[[").filter(|table| !table.starts_with("motion]]")).collect();
+    let text = without_motions.join("[[").replace("EI = 1\n", "EI = 1\nrhoA = 1\nrhoJ = [2e-3, 1e-3, 1e-3]\n");
+    let stage = format!(
+        "[[initial]]\nbeam = \"second\"\nvelocity = [{x}, {y}, {z}]\n\
+         [[stage]]\nkind = \"dynamic\"\nend = {end}\nstep = {step}\n"
+    );
+    text.replace("[[stage]]\nkind = \"static\"\nsteps = 1\n", &stage)
+        .replace("[[spring]]\nat = \"second@0\"\nstiffness = [0, 0, 0, 1, 1, 1]\n", "")
+        .replace("columns = [\"reaction\",", "columns = [")
+        .replace("nodes = [\"first@start\", \"first@end\"]", "nodes = [\"second@start\", \"second@end\"]")
+        .replace("columns = [ \"contact\"", "columns = [\"x\", \"contact\"")
+}
+
+#[test]
+fn a_bar_that_flies_at_another_does_not_pass_through() {
+    let mut random = Random::new(85);
+    let mut failed = Vec::new();
+    const COUNT: usize = 24;
+    for case in 0..COUNT {
+        let Crossing { bars: [first, second], normal } = crossing(&mut random, [0.0, 90.0]);
+        let speed = random.range(0.5, 3.0);
+        let simulation = attempt(&shot(&first, &second, normal * -speed, 5e-4, 0.15));
+        if let Err(failure) = &simulation.result {
+            println!("case {case}: {failure}");
+            failed.push(case);
+        }
+        let least = simulation.column("c.gap").into_iter().fold(f64::INFINITY, f64::min);
+        assert!(least > -0.9 * (first.radius + second.radius), "case {case}: {least}");
+        // The first bar is pushed along all the time: beyond it the force would turn over.
+        let forces = ["x", "y", "z"].map(|axis| simulation.column(&format!("c.f{axis}")));
+        for [x, y, z] in (0..forces[0].len()).map(|row| [0, 1, 2].map(|axis: usize| forces[axis][row])) {
+            let force = Vec3([x, y, z]);
+            assert!(force.dot(normal) <= 0.3 * force.norm(), "case {case}: {force:?}, {normal:?}");
+        }
+    }
+    println!("{} of {COUNT} fail: {failed:?}", failed.len());
+    assert!(failed.len() <= 1, "{failed:?}");
+}
+
+#[test]
+fn beams_that_begin_inside_each_other_are_refused() {
+    let mut random = Random::new(86);
+    let Crossing { bars: [first, second], normal } = crossing(&mut random, [60.0, 61.0]);
+    let inside = Bar { ends: second.ends.map(|end| end - normal * 0.06), ..second };
+    let simulation = attempt(&pushed(&first, &inside, normal * -0.1, 2));
+    let failure = simulation.result.unwrap_err();
+    assert_eq!(failure.kind(), FailureKind::ContactStart);
+    assert!(failure.to_string().contains("inside \"second\""), "{failure}");
+}
