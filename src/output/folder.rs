@@ -8,6 +8,7 @@
 
 use super::files::{FIELDS, PARTIAL_FIELDS, is_at, remove_dead_parts};
 use super::record::{FileRecord, Record};
+use super::stress::{PROFILE, STRESS};
 use super::{OutputError, OutputKind, may_replace, refuse_no_folder, remove_fields, remove_if_there};
 use std::fs::{self, File, TryLockError};
 use std::io::{ErrorKind, Write};
@@ -20,11 +21,13 @@ const RECORD: &str = "run.json";
 /// The file of a run that can be resumed.
 pub const CHECKPOINT: &str = "checkpoint";
 /// The tables that a run may write, and their kinds.
-const TABLES: [(&str, OutputKind); 4] = [
+const TABLES: [(&str, OutputKind); 6] = [
     ("history.csv", OutputKind::History),
     ("history.partial.csv", OutputKind::History),
     ("modes.csv", OutputKind::Modes),
     ("buckling.csv", OutputKind::Buckling),
+    (STRESS, OutputKind::Stress),
+    (PROFILE, OutputKind::Profile),
 ];
 /// The names of tables.
 fn tables() -> impl Iterator<Item = &'static str> {

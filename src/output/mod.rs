@@ -15,6 +15,7 @@ mod plot;
 mod quantities;
 mod record;
 mod report;
+mod stress;
 
 pub use cells::harmless;
 pub use checkpoint::{FoundCheckpoint, SavedRun};
@@ -27,10 +28,11 @@ pub use history::{
 };
 pub use modes::ModesWriter;
 pub use ownership::{OutputKind, may_replace, refuse_no_folder};
-pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale, SectionPicture};
+pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale, SectionPicture, StressShade};
 pub use quantities::{Units, quantity_of};
 pub use record::{
     DeckSource, FileRecord, FinishedRun, ReachedAccuracy, ReachedColumn, ReachedMesh, ReachedMeshes, Record,
     RunSummary, TableRecord, TableSource, WarningRecord,
 };
 pub use report::{Film, Reel, Report};
+pub use stress::{PROFILE, STRESS, write_envelope, write_profile};

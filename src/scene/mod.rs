@@ -15,6 +15,7 @@ mod path;
 mod planar;
 mod rehearsal;
 mod section;
+mod stress;
 mod surfaces;
 mod switches;
 
@@ -23,6 +24,7 @@ pub use computed::{Solution, SolvedSection, solved, warning as section_warning};
 pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
 pub use section::matrices as section_matrices;
+pub use stress::recovery as section_stresses;
 
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody, Target,
@@ -33,7 +35,7 @@ use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::integrate::Scheme;
 use beamsim_core::model::{ElementInfo, ModelParts, StageKind};
-use beamsim_core::probe::{Figure, Need, Probe};
+use beamsim_core::probe::{Figure, Need, Probe, ProfilePlace, StressPlace};
 use beamsim_core::run::{Approach, InitialMotion, Plan, Snapshot, Stage, StageWork, TimeStepping, Until, Warning};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -41,6 +43,7 @@ use beamsim_core::warning::WarningKind;
 use constraints::SceneConstraints;
 use output::Columns;
 use std::sync::Arc;
+use stress::SectionStresses;
 
 /// A deck made ready to run.
 pub struct Scene {
@@ -54,6 +57,10 @@ pub struct Scene {
     pub every: usize,
     /// True if fields are written for ParaView
     pub vtk: bool,
+    /// Places at which the largest stresses of a run are followed, if they are
+    pub envelope: Option<Vec<StressPlace>>,
+    /// Places of which resultants are written at the end of each stage, if they are
+    pub profile: Option<Vec<ProfilePlace>>,
     /// Expectations
     pub expectations: Vec<Expectation>,
     /// Warnings about the deck itself, where the scene was built by [`from_deck`]
@@ -282,8 +289,11 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let composition = compose::compose(deck, &mesh, &histories, &connections, &mut found);
     let SceneConstraints { supports, motions, driven } =
         constraints::constraints(deck, &mesh, &histories, &connections, &mut found);
-    let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity };
+    let stresses = SectionStresses::new(deck);
+    let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity, stresses: &stresses };
     let probes = columns.written(&mut found);
+    let envelope = deck.output.envelope.as_ref().map(|span| columns.stress_places(span, &mut found));
+    let profile = deck.output.profile.as_ref().map(|span| columns.profile_places(span));
     let stages = stages(deck, &columns, &mut found);
     let expectations = expectations(deck, &columns, &mut found);
     let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
@@ -329,6 +339,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         probes,
         every: deck.output.every,
         vtk: deck.output.vtk,
+        envelope,
+        profile,
         expectations,
         warnings: Vec::new(),
         reasons: [vec![planar], composition.reasons].concat(),
