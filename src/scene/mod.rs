@@ -41,6 +41,7 @@ use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
 use constraints::SceneConstraints;
+use figure::SectionsAtNodes;
 use output::Columns;
 use std::sync::Arc;
 use stress::SectionStresses;
@@ -77,12 +78,14 @@ pub struct Scene {
     pub resolved: serde_json::Value,
     /// Beam elasticity, the source of stress resultants
     elasticity: Vec<Arc<dyn StressField>>,
+    /// Sections whose stresses fields show; empty where no stresses are wanted
+    sections_at_nodes: SectionsAtNodes,
 }
 
 impl Scene {
     /// Its whole shape, for pictures.
     pub fn figure(&self) -> Figure {
-        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity)
+        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity, &self.sections_at_nodes)
     }
 
     /// All texts of the deck that may name a place on a beam.
@@ -294,6 +297,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let probes = columns.written(&mut found);
     let envelope = deck.output.envelope.as_ref().map(|span| columns.stress_places(span, &mut found));
     let profile = deck.output.profile.as_ref().map(|span| columns.profile_places(span));
+    let sections_at_nodes = if shows_stress(deck) { columns.sections_at_nodes() } else { Vec::new() };
     let stages = stages(deck, &columns, &mut found);
     let expectations = expectations(deck, &columns, &mut found);
     let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
@@ -349,7 +353,15 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         links: composition.links,
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
+        sections_at_nodes,
     })
+}
+
+/// True if fields show stresses: those of a deck that asks for stresses.
+fn shows_stress(deck: &Deck) -> bool {
+    let output = &deck.output;
+    let has_columns = output.columns.iter().flatten().any(|key| key.value == "stress");
+    output.vtk && (has_columns || output.envelope.is_some() || output.profile.is_some())
 }
 
 /// The coordinates of a point that a deck gives by its name or its coordinates.

@@ -374,13 +374,15 @@ fn climb(form: ClosedForm, start: [usize; 2], value: &dyn Fn([f64; 2]) -> f64) -
     let steps = [0, 1].map(|axis| (domain[axis][1] - domain[axis][0]) / counts[axis] as f64);
     let mut at = [0, 1].map(|axis| domain[axis][0] + steps[axis] * start[axis] as f64);
     let mut best = value(at);
-    for shorter in [1.0, 0.25, 0.0625] {
+    for shorter in [1.0, 0.5, 0.25, 0.125, 0.0625] {
         for axis in 0..2 {
             let step = shorter * steps[axis];
             let moved = |by: f64| {
                 let mut to = at;
                 to[axis] += by;
-                let [low, high] = domain[axis];
+                // A radius below zero is one on the other side of the centre.
+                let [low, high] =
+                    if axis == 0 && domain[0][0] == 0.0 { [-domain[0][1], domain[0][1]] } else { domain[axis] };
                 let is_inside = low <= to[axis] && to[axis] <= high;
                 (is_inside || form.is_closed(axis)).then(|| (value(to), to))
             };
