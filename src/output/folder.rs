@@ -8,7 +8,6 @@
 
 use super::files::{FIELDS, PARTIAL_FIELDS, is_at, remove_dead_parts};
 use super::record::{FileRecord, Record};
-use super::stress::{PROFILE, STRESS};
 use super::{OutputError, OutputKind, may_replace, refuse_no_folder, remove_fields, remove_if_there};
 use std::fs::{self, File, TryLockError};
 use std::io::{ErrorKind, Write};
@@ -20,6 +19,10 @@ const LOCK: &str = ".lock";
 const RECORD: &str = "run.json";
 /// The file of a run that can be resumed.
 pub const CHECKPOINT: &str = "checkpoint";
+/// The table of largest stresses.
+pub const STRESS: &str = "stress.csv";
+/// The table of resultants along beams.
+pub const PROFILE: &str = "profile.csv";
 /// The tables that a run may write, and their kinds.
 const TABLES: [(&str, OutputKind); 6] = [
     ("history.csv", OutputKind::History),

@@ -22,7 +22,7 @@ pub use checkpoint::{FoundCheckpoint, SavedRun};
 pub use error::OutputError;
 pub use fields::{FieldsWriter, SavedFields};
 pub use files::{PartFile, remove_dead_parts, remove_fields, remove_if_there};
-pub use folder::{ResultFolder, settle};
+pub use folder::{PROFILE, ResultFolder, STRESS, settle};
 pub use history::{
     HistoryReader, HistoryWriter, Row, RowCounter, Rows, SavedBars, SavedCompanion, SavedHistory, SideColumns,
 };
@@ -35,4 +35,4 @@ pub use record::{
     RunSummary, TableRecord, TableSource, WarningRecord,
 };
 pub use report::{Film, Reel, Report};
-pub use stress::{PROFILE, STRESS, write_envelope, write_profile};
+pub use stress::{write_envelope, write_profile};

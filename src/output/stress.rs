@@ -2,17 +2,12 @@
 //! along all beams at the end of each stage.
 
 use super::cells::harmless;
+use super::folder::{PROFILE, STRESS};
 use super::{OutputError, ResultFolder};
 use crate::scene::Mesh;
 use beamsim_core::probe::{BeamPoint, Envelope, Extreme, Extremes, Profile, ProfilePlace, StageEnd, StressPlace};
 use beamsim_core::section::Vector6;
 use beamsim_core::section::recovery::{Measure, Recovery};
-
-/// The name of the table of largest stresses.
-pub const STRESS: &str = "stress.csv";
-
-/// The name of the table of resultants.
-pub const PROFILE: &str = "profile.csv";
 
 /// Columns of a place.
 const PLACE: [&str; 3] = ["beam", "fraction", "length"];
