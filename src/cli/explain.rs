@@ -72,7 +72,8 @@ fn describe_part(group: &ColumnGroup, part: &ColumnPart) -> String {
     let owner = match group.source {
         Source::Place(_) => "a node or a place on a beam",
         Source::Node(_) => "a node",
-        Source::BeamPoint(_) => "a place on a beam",
+        Source::BeamPoint(_) | Source::Stress(_) => "a place on a beam",
+        Source::StressPoint(_) => "a point of a section at a place on a beam",
         Source::Contact(_) => "a contact",
         Source::Scene(_) => "the whole scene",
         Source::Run(_) => "the run",
@@ -82,7 +83,13 @@ fn describe_part(group: &ColumnGroup, part: &ColumnPart) -> String {
     let names = if names.is_empty() { group.key.to_string() } else { names.join(", ") };
     let how = match group.source {
         Source::Run(_) => "in every history".to_string(),
-        Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) | Source::Contact(_) | Source::Scene(_) => {
+        Source::Place(_)
+        | Source::Node(_)
+        | Source::BeamPoint(_)
+        | Source::Stress(_)
+        | Source::StressPoint(_)
+        | Source::Contact(_)
+        | Source::Scene(_) => {
             format!("written by columns = [\"{}\"] in [output]", group.key)
         }
     };

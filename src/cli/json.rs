@@ -175,6 +175,21 @@ pub fn sweep(table: &Path, points: usize, finished: usize, failed: &BTreeMap<&st
     print("sweep", Sweep { table: text(table), points, finished, failed });
 }
 
+/// A largest stress of a section.
+#[derive(Serialize)]
+pub struct SectionStress {
+    /// Name of the load
+    pub load: String,
+    /// Name of its column
+    pub measure: String,
+    /// Largest, or smallest, value
+    pub value: f64,
+    /// Its place, in the coordinates of the shape
+    pub at: [f64; 2],
+    /// Its region
+    pub region: String,
+}
+
 /// The numbers of a section.
 #[derive(Serialize)]
 pub struct Section {
@@ -206,6 +221,8 @@ pub struct Section {
     pub ei: Option<[f64; 2]>,
     /// Angle from axis 2 to the axis of the larger bending stiffness, rad
     pub principal_angle: Option<f64>,
+    /// Largest von Mises stresses under unit resultants, or the given ones, of sections with a shape
+    pub stress: Vec<SectionStress>,
     /// 6x6 stiffness by rows
     pub stiffness: Vec<Vec<f64>>,
     /// 6x6 mass by rows

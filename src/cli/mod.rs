@@ -23,6 +23,7 @@ mod restart;
 mod run;
 mod schema;
 mod section;
+mod section_stress;
 mod signals;
 mod simulate;
 mod status;

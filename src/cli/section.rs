@@ -3,7 +3,7 @@
 use super::error::CommandError;
 use super::status::Status;
 use super::verdict::Verdict;
-use super::{console, folders, json, load, outputs};
+use super::{console, folders, json, load, outputs, section_stress};
 use crate::deck::{self, Deck};
 use crate::output::{OutputKind, PartFile, SectionPicture, Units};
 use crate::scene::{self, Solution, SolvedSection};
@@ -33,6 +33,9 @@ pub struct SectionArguments {
     /// Folder of the pictures (default: results/<deck name>)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Resultants of which stresses are shown, in the axes of the beam (default: each unit resultant)
+    #[arg(long, value_name = "N1,N2,N3,M1,M2,M3", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    load: Vec<f64>,
 }
 
 /// Prints properties of sections and draws those that were computed.
@@ -53,18 +56,26 @@ fn all(wanted: &SectionArguments) -> Result<(), CommandError> {
     let deck = &read.deck;
     let units = Units::of_deck(&deck.resolved);
     let folder = folders::folder(wanted.out.as_deref(), &load::name(path), false);
+    let loads = section_stress::loads(&wanted.load)?;
     let mut warnings = Vec::new();
     for section in chosen(deck, &wanted.names)? {
         let matrices = scene::section_matrices(section, deck).map_err(|found| read.refuse(path, &[found]))?;
         let solved = scene::solved(section, deck).transpose().map_err(|found| read.refuse(path, &[found]))?;
         let report = Report::new(section, &matrices, solved.as_ref(), &units);
         report.print();
+        let stresses = solved.as_ref().map(|_| scene::section_stresses(section, deck, &section.name.span));
+        let stresses = stresses.transpose().map_err(|found| read.refuse(path, &[found]))?;
+        let shown =
+            stresses.as_ref().map_or(Vec::new(), |stresses| section_stress::show(stresses, &loads, &units, digits));
         let picture = picture_name(&section.name.value, deck);
-        let pictures = match solved.as_ref().and_then(|solved| solved.solution.as_ref()) {
-            Some(solution) => draw(&report, solution, &folder, &picture)?,
-            None => Vec::new(),
+        let pictures = match (solved.as_ref().and_then(|solved| solved.solution.as_ref()), &stresses) {
+            (Some(solution), Some(stresses)) => {
+                let drawn = section_stress::pictures(solution, stresses, &loads, &units, digits)?;
+                draw(&report, solution, drawn, &folder, &picture)?
+            }
+            (Some(_) | None, _) => Vec::new(),
         };
-        json::section(&report.summary(path, &pictures));
+        json::section(&report.summary(path, shown, &pictures));
         warnings.extend(scene::section_warning(section, deck));
     }
     read.warn(path, warnings)
@@ -199,7 +210,7 @@ impl<'a> Report<'a> {
         console::line(&format!("  {name}: ({}, {}){unit}", digits(x2), digits(x3)));
     }
 
-    fn summary(&self, deck: &Path, pictures: &[PathBuf]) -> json::Section {
+    fn summary(&self, deck: &Path, stress: Vec<json::SectionStress>, pictures: &[PathBuf]) -> json::Section {
         let analysis = self.solved.and_then(|solved| solved.solution.as_ref()).map(|solution| &solution.analysis);
         let rows = |matrix: &Matrix6| (0..6).map(|i| (0..6).map(|j| matrix[(i, j)]).collect()).collect();
         let text = |path: &Path| path.display().to_string();
@@ -218,6 +229,7 @@ impl<'a> Report<'a> {
             gj: self.properties.map(|p| p.gj),
             ei: self.properties.map(|p| p.ei),
             principal_angle: self.properties.map(|p| p.principal_angle),
+            stress,
             stiffness: rows(&self.stiffness),
             mass: self.mass.as_ref().map(rows),
             pictures: pictures.iter().map(|path| text(path)).collect(),
@@ -229,7 +241,13 @@ impl<'a> Report<'a> {
 const MASS_PER_LENGTH: Dimension = Dimension { angle: 0, length: -2, force: 1, time: 2 };
 
 /// Draws a section; gives the paths of the pictures.
-fn draw(report: &Report, solution: &Solution, folder: &Path, file: &str) -> Result<Vec<PathBuf>, CommandError> {
+fn draw<'a>(
+    report: &Report,
+    solution: &'a Solution,
+    stresses: Vec<(String, SectionPicture<'a>)>,
+    folder: &Path,
+    file: &str,
+) -> Result<Vec<PathBuf>, CommandError> {
     let analysis = &solution.analysis;
     let centres = analysis.properties();
     let place = report.solved.map_or([0.0; 2], |solved| solved.place);
@@ -250,17 +268,20 @@ fn draw(report: &Report, solution: &Solution, folder: &Path, file: &str) -> Resu
         materials: solution.materials.iter().map(|material| material.name.clone()).collect(),
         points,
         warping: None,
+        stress: None,
     };
     let of_warping = SectionPicture {
         title: format!("section {name}: warping along axis 1 under a torque about it"),
         points: vec![("shear centre", centres.shear_centre)],
         materials: Vec::new(),
         warping: Some(analysis.solution.axial_warping(&analysis.mesh, TORQUE)),
-        ..of_materials
+        mesh: &analysis.mesh,
+        stress: None,
     };
     outputs::check_folder(folder, &[])?;
     let mut paths = Vec::new();
-    for (kind, picture) in [("", of_materials), (WARPING, of_warping)] {
+    let own = [(String::new(), of_materials), (WARPING.into(), of_warping)];
+    for (kind, picture) in own.into_iter().chain(stresses) {
         let path = folder.join(format!("{file}{kind}.svg"));
         outputs::check_file(&path, OutputKind::Svg)?;
         PartFile::write_to(&path, picture.to_svg().as_bytes())?;
@@ -317,7 +338,8 @@ fn picture_name(section: &str, deck: &Deck) -> String {
     for own in &deck.sections {
         let plain = file_name(&own.name.value);
         let numbered = (2_usize..).map(|number| format!("{plain}_{number}"));
-        let files = |name: &String| [name.to_lowercase(), format!("{name}{WARPING}").to_lowercase()];
+        let ends = || section_stress::endings().chain([String::new(), WARPING.into()]);
+        let files = |name: &String| ends().map(|end| format!("{name}{end}").to_lowercase()).collect::<Vec<_>>();
         let is_free = |name: &String| files(name).iter().all(|file| !taken.contains(file));
         let found = std::iter::once(plain.clone()).chain(numbered).find(is_free).unwrap_or(plain.clone());
         taken.extend(files(&found));

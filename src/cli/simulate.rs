@@ -5,13 +5,14 @@ use super::console;
 use super::progress::Progress;
 use super::signals;
 use crate::output::{
-    DeckSource, FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, ReachedAccuracy, Record,
-    ResultFolder, Row, RowCounter, Rows, SavedRun, SideColumns, Units,
+    DeckSource, FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, PROFILE, ReachedAccuracy,
+    Record, ResultFolder, Row, RowCounter, Rows, STRESS, SavedRun, SideColumns, Units, write_envelope, write_profile,
 };
 use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
 use crate::study::{self, Recorder};
 use beamsim_core::model::StageKind;
+use beamsim_core::probe::{Envelope, Profile};
 use beamsim_core::run::{Checkpoint, Counters, Failure, Moment, Observer, Run, Snapshot, StageResult, Warning};
 use beamsim_core::threads;
 use std::time::{Duration, Instant};
@@ -91,8 +92,8 @@ pub fn simulate(
         }
         Err(error) => (None, None, Err(Failure::Io(error.to_string()))),
     };
-    // A film, fields and checkpoints need the whole state of each row, which an outcome does not have.
-    let needs_states = film.is_some() || from.is_some() || results.as_ref().is_some_and(|r| r.fields.is_some());
+    // A film, fields, stresses along beams and checkpoints need the whole state of each row, which an outcome does not have.
+    let needs_states = film.is_some() || from.is_some() || results.as_ref().is_some_and(Results::need_states);
     let outcome = outcome.filter(|_| !needs_states);
     let mut watcher = Watcher {
         scene,
@@ -119,12 +120,14 @@ pub fn simulate(
     let mut record = None;
     let mut folder = None;
     if let Some(mut results) = watcher.results.take() {
-        let completed = results.complete(result.is_ok());
+        let completed = results.complete(scene, result.is_ok());
         if let (Ok(()), Err(error)) = (&result, completed) {
             result = Err(Failure::Io(error.to_string()));
         }
         let resumed = results.resumed;
-        let run = FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, source, resumed };
+        let envelope = results.envelope.as_ref();
+        let run =
+            FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, source, resumed, envelope };
         let mut content = Record::of(scene, run);
         let (claimed, written) = results.commit(result.is_ok(), &mut content);
         folder = Some(claimed);
@@ -142,6 +145,10 @@ struct Results {
     history: HistoryWriter,
     fields: Option<FieldsWriter>,
     modes: ModesWriter,
+    /// The largest stresses, where they are followed
+    envelope: Option<Envelope>,
+    /// Resultants at the ends of stages, where they are written
+    profile: Option<Profile>,
     rows: RowCounter,
     /// How often the run was resumed
     resumed: u32,
@@ -169,14 +176,19 @@ impl Results {
             let history = HistoryWriter::create(&folder, names, bars)?;
             let fields = scene.vtk.then(|| FieldsWriter::create(&folder, scene.figure(), timed)).transpose()?;
             let results = Self::new(folder, history, RowCounter::new(rows), interval);
-            return Ok((Self { fields, ..results }, None));
+            let envelope = scene.envelope.clone().map(Envelope::new);
+            let profile = scene.profile.clone().map(|places| Profile::new(places, Vec::new()));
+            return Ok((Self { fields, envelope, profile, ..results }, None));
         };
-        let SavedRun { resumed, rows: seen, history, modes, fields, reel: _, bars: _, run } = *saved;
+        let SavedRun { resumed, rows: seen, history, modes, fields, reel: _, bars: _, envelope, profile, run } = *saved;
         folder.reserve(RESERVED)?;
         let history = HistoryWriter::resume(&folder, names, bars, history)?;
         let fields = fields.map(|saved| FieldsWriter::resume(&folder, scene.figure(), timed, saved)).transpose()?;
         let results = Self::new(folder, history, RowCounter::after(rows, seen), interval);
-        Ok((Self { fields, modes, resumed: resumed + 1, ..results }, Some(run)))
+        let followed = scene.envelope.clone();
+        let envelope = followed.map(|places| Envelope::resume(places, envelope.unwrap_or_default()));
+        let profile = scene.profile.clone().map(|places| Profile::new(places, profile.unwrap_or_default()));
+        Ok((Self { fields, modes, envelope, profile, resumed: resumed + 1, ..results }, Some(run)))
     }
 
     /// The results of a run with a history alone, which was not resumed.
@@ -186,6 +198,8 @@ impl Results {
             history,
             fields: None,
             modes: ModesWriter::default(),
+            envelope: None,
+            profile: None,
             rows,
             resumed: 0,
             interval,
@@ -205,6 +219,8 @@ impl Results {
             fields: self.fields.as_mut().map(FieldsWriter::save).transpose()?,
             reel: film.map(|film| film.reel().clone()),
             bars: self.history.side_columns().map(SideColumns::save),
+            envelope: self.envelope.as_ref().map(|envelope| envelope.found().to_vec()),
+            profile: self.profile.as_ref().map(|profile| profile.ends().to_vec()),
             run,
         };
         saved.write(scene, &self.folder)?;
@@ -213,16 +229,35 @@ impl Results {
     }
 
     /// Completes all files but the record. Those that can be written are, whatever fails.
-    fn complete(&mut self, is_finished: bool) -> Result<(), OutputError> {
+    fn complete(&mut self, scene: &Scene, is_finished: bool) -> Result<(), OutputError> {
         let history = self.history.complete();
         let is_finished = is_finished && history.is_ok();
         let modes = self.modes.finish(&self.folder).map(|names| self.names.extend(names));
-        let is_finished = is_finished && modes.is_ok();
+        let stresses = self.write_stresses(scene);
+        let is_finished = is_finished && modes.is_ok() && stresses.is_ok();
         let fields = self
             .fields
             .take()
             .map_or(Ok(()), |fields| fields.finish(&self.folder, is_finished).map(|name| self.names.push(name)));
-        history.and(modes).and(fields)
+        history.and(modes).and(stresses).and(fields)
+    }
+
+    /// Writes the tables of stresses and resultants along beams, where they are wanted.
+    fn write_stresses(&mut self, scene: &Scene) -> Result<(), OutputError> {
+        if let Some(envelope) = &self.envelope {
+            write_envelope(&self.folder, &scene.mesh, envelope)?;
+            self.names.push(STRESS);
+        }
+        if let Some(profile) = &self.profile {
+            write_profile(&self.folder, &scene.mesh, profile)?;
+            self.names.push(PROFILE);
+        }
+        Ok(())
+    }
+
+    /// True if whole states are needed, not only the numbers of the history.
+    fn need_states(&self) -> bool {
+        self.fields.is_some() || self.envelope.is_some() || self.profile.is_some()
     }
 
     /// Gives all results their names, and returns the folder, which is still claimed.
@@ -301,6 +336,10 @@ impl Observer for Watcher<'_> {
         self.values = values;
         let row = row?;
         self.film.iter_mut().for_each(|film| film.row(snapshot, row));
+        if let Some(results) = &mut self.results {
+            results.envelope.iter_mut().for_each(|envelope| envelope.row(snapshot));
+            results.profile.iter_mut().for_each(|profile| profile.row(snapshot));
+        }
         let mut fields = self.results.iter_mut().filter_map(|results| results.fields.as_mut());
         fields.try_for_each(|fields| fields.row(snapshot, row)).map_err(io_failure)
     }

@@ -74,7 +74,7 @@ pub use parameters::Parameters;
 pub use point::PointRef;
 pub use schema::{Entry, SCHEMA, entries, explain, similar};
 pub use scheme::{SchemeName, SchemeWord};
-pub use section::{Section, SectionBody};
+pub use section::{CornerWord, Section, SectionBody, SectionProbe};
 pub use section_shape::{
     Airfoil, ComputedSection, ComputedShape, Fibre, Flanged, LeadingEdgeWord, MeshAim, Outline, Reference,
     ReferenceWord, Region, Shape, ShapeWord, ShearFactor, SkinPart, SkinSideWord, ThetaSenseWord, TrailingEdgeWord,

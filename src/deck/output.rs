@@ -19,16 +19,29 @@ pub struct Output {
     pub interval_span: Span,
     /// True where the whole shape is written for ParaView
     pub vtk: bool,
+    /// Place of `envelope`, where the largest stresses along all beams are written
+    pub envelope: Option<Span>,
+    /// Place of `profile`, where resultants along all beams are written
+    pub profile: Option<Span>,
 }
 
 impl Default for Output {
     fn default() -> Self {
-        Self { nodes: None, columns: None, every: 1, interval: None, interval_span: 0..0, vtk: false }
+        Self {
+            nodes: None,
+            columns: None,
+            every: 1,
+            interval: None,
+            interval_span: 0..0,
+            vtk: false,
+            envelope: None,
+            profile: None,
+        }
     }
 }
 
 /// Keys of `[output]`.
-pub(super) const KEYS: [&str; 5] = ["nodes", "columns", "every", "interval", "vtk"];
+pub(super) const KEYS: [&str; 7] = ["nodes", "columns", "every", "interval", "vtk", "envelope", "profile"];
 
 pub(super) fn read_output(top: &Table) -> Output {
     let Some(item) = top.get("output") else { return Output::default() };
@@ -37,6 +50,7 @@ pub(super) fn read_output(top: &Table) -> Output {
         table.refuse("interval", "give `every` or `interval`, not both");
     }
     let texts = |key: &str| table.optional(key, Context::texts).flatten();
+    let wanted = |key: &str| table.flag_or(key, false).unwrap_or(false).then(|| table.key_span(key));
     Output {
         nodes: texts("nodes"),
         columns: texts("columns"),
@@ -44,5 +58,7 @@ pub(super) fn read_output(top: &Table) -> Output {
         interval: table.positive("interval").map(|v| v.value),
         interval_span: table.key_span("interval"),
         vtk: table.flag_or("vtk", false).unwrap_or(false),
+        envelope: wanted("envelope"),
+        profile: wanted("profile"),
     }
 }

@@ -301,6 +301,7 @@ mod tests {
             ("expect.warns", warnings.chain(["false".to_string()]).collect()),
             ("joint.kind", words::<JointKind>()),
             ("load.frame", words::<Frame>()),
+            ("section.corner", words::<deck::CornerWord>()),
             ("section.le", words::<deck::LeadingEdgeWord>()),
             ("section.shape", words::<deck::ShapeWord>()),
             ("section.side", words::<deck::WallSideWord>()),

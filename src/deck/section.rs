@@ -3,6 +3,7 @@
 use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table, joined, kind_of};
 use super::section_shape::{self, ComputedSection, ComputedShape, Fibre, Shape, ShearFactor};
+use super::words::words;
 use toml::de::DeValue;
 
 /// `[section.NAME]`
@@ -12,6 +13,29 @@ pub struct Section {
     pub name: Spanned<String>,
     /// Stiffness and mass in one of three ways
     pub body: SectionBody,
+    /// Points of the shape at which stresses are written
+    pub probes: Vec<SectionProbe>,
+    /// Search for the largest stress near re-entrant corners
+    pub corner: CornerWord,
+}
+
+/// A named point of a shape.
+#[derive(Clone, Debug)]
+pub struct SectionProbe {
+    /// Name
+    pub name: Spanned<String>,
+    /// Coordinates 2 and 3 of the shape
+    pub at: [f64; 2],
+}
+
+words! {
+    /// `corner = …`
+    pub enum CornerWord {
+        /// Points within a wall thickness of a sharp re-entrant corner are left out
+        Exclude = "exclude",
+        /// All points are looked at
+        Include = "include",
+    }
 }
 
 /// The three ways to give a section.
@@ -49,9 +73,11 @@ pub enum SectionBody {
 const RESULTANT_KEYS: [&str; 6] = ["EA", "GA", "GJ", "EI", "rhoA", "rhoJ"];
 const FULL_KEYS: [&str; 2] = ["stiffness", "mass"];
 
+const STRESS_KEYS: [&str; 2] = ["probe", "corner"];
+
 /// Keys of `[section.NAME]`.
-pub(super) const KEYS: [&str; 8 + section_shape::KEYS.len()] =
-    joined(&[&RESULTANT_KEYS, &FULL_KEYS, &section_shape::KEYS]);
+pub(super) const KEYS: [&str; 10 + section_shape::KEYS.len()] =
+    joined(&[&RESULTANT_KEYS, &FULL_KEYS, &section_shape::KEYS, &STRESS_KEYS]);
 
 /// Reads a section; `layups` are the names of all layups of the deck.
 pub(super) fn read_section<'a>(
@@ -78,7 +104,31 @@ pub(super) fn read_section<'a>(
             format!("{} is defined in two ways; keep only one of: EA, GA, GJ, EI; `stiffness`; `shape`", table.what),
         ),
     };
-    Some(Section { name, body: body? })
+    if by_shape.is_none() {
+        for key in STRESS_KEYS {
+            table.refuse(key, format!("`{key}` is about stresses, which a section has only by its `shape`"));
+        }
+    }
+    let probes = if table.has("probe") { read_probes(&table) } else { Some(Vec::new()) };
+    let corner = table.word_or("corner", CornerWord::Exclude);
+    Some(Section { name, body: body?, probes: probes?, corner: corner? })
+}
+
+/// Names and places of points. A name begins with a letter, so that columns of places such as
+/// `arm@0.5` are told apart.
+fn read_probes(table: &Table) -> Option<Vec<SectionProbe>> {
+    let points = Table::of_names(table.context, table.get("probe")?, "`probe`")?;
+    let read = |(name, item): (Spanned<String>, &Item)| {
+        let at = table.context.vector(item)?.value;
+        let is_plain = name.value.chars().all(|c| c.is_alphanumeric() || c == '_');
+        if !is_plain || !name.value.starts_with(char::is_alphabetic) {
+            let message = format!("a point of a section has a name of letters and digits, found `{}`", name.value);
+            return table.context.wrong(name.span, message);
+        }
+        Some(SectionProbe { name, at })
+    };
+    let all: Vec<_> = points.entries().map(read).collect();
+    all.into_iter().collect()
 }
 
 /// Circles, tubes and rectangles as they are, and all other shapes, which are computed.

@@ -189,6 +189,9 @@ fn grid(figure: &Figure, stage: usize, state: &State, origin: Option<&State>) ->
     grid.floats("position", 3, looks.iter().flat_map(|look| look.place.0));
     grid.tag("</Points>\n<PointData Vectors=\"displacement\">");
     point_data(&mut grid, &looks);
+    if let Some(stress) = figure.von_mises(&looks) {
+        grid.floats("vm", 1, stress.into_iter());
+    }
     grid.tag("</PointData>\n<CellData>");
     grid.array("beam", "Int32", 1, cells.beams.iter().flat_map(|beam| beam.to_le_bytes()).collect());
     grid.tag("</CellData>\n<Cells>");

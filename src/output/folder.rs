@@ -19,12 +19,18 @@ const LOCK: &str = ".lock";
 const RECORD: &str = "run.json";
 /// The file of a run that can be resumed.
 pub const CHECKPOINT: &str = "checkpoint";
+/// The table of largest stresses.
+pub const STRESS: &str = "stress.csv";
+/// The table of resultants along beams.
+pub const PROFILE: &str = "profile.csv";
 /// The tables that a run may write, and their kinds.
-const TABLES: [(&str, OutputKind); 4] = [
+const TABLES: [(&str, OutputKind); 6] = [
     ("history.csv", OutputKind::History),
     ("history.partial.csv", OutputKind::History),
     ("modes.csv", OutputKind::Modes),
     ("buckling.csv", OutputKind::Buckling),
+    (STRESS, OutputKind::Stress),
+    (PROFILE, OutputKind::Profile),
 ];
 /// The names of tables.
 fn tables() -> impl Iterator<Item = &'static str> {

@@ -22,6 +22,10 @@ pub enum OutputKind {
     Modes,
     /// buckling.csv
     Buckling,
+    /// stress.csv
+    Stress,
+    /// profile.csv
+    Profile,
     /// effects.csv
     Effects,
     /// cost.csv
@@ -51,6 +55,8 @@ impl OutputKind {
             Self::Record => begins("{\n  \"version\": \"") && holds("\n  \"status\": \""),
             Self::Modes => begins("stage,mode,omega,"),
             Self::Buckling => begins("stage,mode,load,"),
+            Self::Stress => begins("beam,fraction,length,section,vm,"),
+            Self::Profile => begins("stage,time,load,beam,fraction,length,"),
             Self::Effects => begins("without,status,iterations,"),
             Self::Cost => begins("order,interpolation,scheme,elements,"),
             Self::Sweep => begins("point,") && head.split(|byte| *byte == b'\n').next().is_some_and(is_of_sweep),

@@ -3,8 +3,9 @@
 use super::json::{Entries, Number};
 use super::{OutputError, Units};
 use crate::deck::{self, ImportedTable};
-use crate::scene::{Reason, Scene};
+use crate::scene::{Mesh, Reason, Scene};
 use beamsim_core::failure::FailureKind;
+use beamsim_core::probe::{Envelope, Extreme, StressPlace};
 use beamsim_core::run::{
     ContactCounters, Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning,
 };
@@ -38,6 +39,8 @@ pub struct FinishedRun<'a> {
     pub source: DeckSource,
     /// How often the run was resumed
     pub resumed: u32,
+    /// The largest stresses, where they were followed
+    pub envelope: Option<&'a Envelope>,
 }
 
 /// The text of a deck, and the long tables beside it. Their rows are not repeated in run.json: a
@@ -187,6 +190,9 @@ struct Findings {
     stability: Vec<StabilityRecord>,
     time_errors: Vec<TimeErrorRecord>,
     warnings: Vec<WarningRecord>,
+    /// The largest stresses by beam and section
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    stress: Vec<StressRecord>,
     threads: usize,
     seconds: SecondsRecord,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -263,6 +269,30 @@ pub struct WarningRecord {
     time: Option<f64>,
     load: Option<f64>,
     message: String,
+}
+
+/// The largest stresses of a section on a beam.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+struct StressRecord {
+    beam: String,
+    section: String,
+    vm: Option<ExtremeRecord>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    index: Option<ExtremeRecord>,
+}
+
+/// A largest value: when and where it was, and the resultants N1 N2 N3 M1 M2 M3 then.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct ExtremeRecord {
+    value: Number,
+    stage: usize,
+    time: Number,
+    load: Number,
+    fraction: f64,
+    point: [f64; 2],
+    region: String,
+    resultant: [Number; 6],
 }
 
 /// Wall-clock seconds.
@@ -375,7 +405,7 @@ impl<'a> RunSummary<'a> {
 impl Record {
     /// The record of a run.
     pub fn of(scene: &Scene, run: FinishedRun) -> Self {
-        let FinishedRun { result, counters, seconds, threads, accuracy, source, resumed } = run;
+        let FinishedRun { result, counters, seconds, threads, accuracy, source, resumed, envelope } = run;
         let found = &counters.findings;
         let warnings = scene.warnings.iter().chain(&found.warnings);
         let findings = Findings {
@@ -385,6 +415,7 @@ impl Record {
             stability: found.stability.iter().map(StabilityRecord::from).collect(),
             time_errors: found.time_errors.iter().map(TimeErrorRecord::from).collect(),
             warnings: warnings.map(WarningRecord::from).collect(),
+            stress: envelope.map_or(Vec::new(), |envelope| stress_records(envelope, &scene.mesh)),
             threads,
             seconds: SecondsRecord {
                 total: seconds,
@@ -523,6 +554,41 @@ impl From<&Counters> for CountersRecord {
             evaluations: Entries(evaluations.collect()),
             linear_solvers: counters.linear_solvers.iter().map(ToString::to_string).collect(),
         }
+    }
+}
+
+/// The largest stresses of all places by beam and section, in the order of the beams.
+fn stress_records(envelope: &Envelope, mesh: &Mesh) -> Vec<StressRecord> {
+    let mut records: Vec<StressRecord> = Vec::new();
+    for (place, found) in envelope.places().iter().zip(envelope.found()) {
+        let beam = &mesh.beams[place.inside.beam].name;
+        let section = &place.section.name;
+        let number = records.iter().position(|known| known.beam == *beam && known.section == *section);
+        let number = number.unwrap_or_else(|| {
+            records.push(StressRecord { beam: beam.clone(), section: section.clone(), ..StressRecord::default() });
+            records.len() - 1
+        });
+        let record = &mut records[number];
+        for (known, new) in [(&mut record.vm, found.von_mises), (&mut record.index, found.index)] {
+            let is_larger = |new: &Extreme| known.as_ref().is_none_or(|known| new.value > known.value.0);
+            if let Some(new) = new.filter(is_larger) {
+                *known = Some(extreme_record(&new, place));
+            }
+        }
+    }
+    records
+}
+
+fn extreme_record(found: &Extreme, place: &StressPlace) -> ExtremeRecord {
+    ExtremeRecord {
+        value: Number(found.value),
+        stage: found.moment.stage,
+        time: Number(found.moment.time),
+        load: Number(found.moment.load),
+        fraction: place.inside.fraction,
+        point: found.at,
+        region: place.section.regions.get(found.region).cloned().unwrap_or_default(),
+        resultant: found.resultant.map(Number),
     }
 }
 

@@ -227,12 +227,7 @@ impl Draft<'_> {
         if let Some(known) = self.materials.iter().position(|material| material.name == name.value) {
             return Ok(known);
         }
-        let elastic = match found.elastic {
-            Elastic::Isotropic(elastic) => material::Elastic::Isotropic { e: elastic.young, nu: elastic.poisson },
-            Elastic::Orthotropic { young, shear, poisson } => {
-                material::Elastic::Orthotropic { e: young, g: shear, nu: poisson }
-            }
-        };
+        let elastic = elastic_of(&found.elastic);
         self.materials.push(Material { name: name.value.clone(), elastic, density: found.density.unwrap_or(0.0) });
         Ok(self.materials.len() - 1)
     }
@@ -464,6 +459,16 @@ impl Draft<'_> {
             | SectionError::CrossingEdges { .. }
             | SectionError::Singular
             | SectionError::Interrupted => Diagnostic::error(message, span),
+        }
+    }
+}
+
+/// The constants of a material of the deck.
+pub fn elastic_of(elastic: &Elastic) -> material::Elastic {
+    match *elastic {
+        Elastic::Isotropic(elastic) => material::Elastic::Isotropic { e: elastic.young, nu: elastic.poisson },
+        Elastic::Orthotropic { young, shear, poisson } => {
+            material::Elastic::Orthotropic { e: young, g: shear, nu: poisson }
         }
     }
 }

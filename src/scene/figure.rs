@@ -5,16 +5,28 @@ use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::Link;
 use beamsim_core::probe::{BeamPoint, Figure, Line, LinePoint, Place};
+use beamsim_core::section::recovery::Recovery;
 use beamsim_core::tensor::Mat3;
 use nalgebra::Matrix6;
 use std::sync::Arc;
 
-/// Every node of every beam, the rigid bodies, and the ends of what joins two nodes.
-pub fn figure(mesh: &Mesh, bodies: &[Body], links: &[Link], elasticity: &[Arc<dyn StressField>]) -> Figure {
+/// Stresses of the sections at the nodes of each beam, where they are known
+pub type SectionsAtNodes = Vec<Vec<Option<Arc<Recovery>>>>;
+
+/// Every node of every beam, the rigid bodies, and the ends of what joins two nodes. `sections` may be
+/// empty.
+pub fn figure(
+    mesh: &Mesh,
+    bodies: &[Body],
+    links: &[Link],
+    elasticity: &[Arc<dyn StressField>],
+    sections: &SectionsAtNodes,
+) -> Figure {
+    let section = |number: usize, k: usize| sections.get(number).and_then(|beam| beam[k].clone());
     let line = |(number, beam): (usize, &MeshBeam)| Line {
         name: beam.name.clone(),
         order: beam.order,
-        points: (0..beam.nodes.len()).map(|k| point(mesh, number, k, elasticity)).collect(),
+        points: (0..beam.nodes.len()).map(|k| point(mesh, number, k, elasticity, section(number, k))).collect(),
     };
     let bare = |node, place| Place { nodes: vec![(node, place, 1.0)], frame: Mat3::IDENTITY, relative: false };
     let ends = |link: &Link| [0, 1].map(|k| bare(link.nodes[k], link.places[k]));
@@ -25,7 +37,13 @@ pub fn figure(mesh: &Mesh, bodies: &[Body], links: &[Link], elasticity: &[Arc<dy
     }
 }
 
-fn point(mesh: &Mesh, number: usize, k: usize, elasticity: &[Arc<dyn StressField>]) -> LinePoint {
+fn point(
+    mesh: &Mesh,
+    number: usize,
+    k: usize,
+    elasticity: &[Arc<dyn StressField>],
+    section: Option<Arc<Recovery>>,
+) -> LinePoint {
     let beam = &mesh.beams[number];
     let node = &mesh.nodes[beam.nodes[k]];
     let fraction = beam.fractions[k];
@@ -45,5 +63,6 @@ fn point(mesh: &Mesh, number: usize, k: usize, elasticity: &[Arc<dyn StressField
         place: Place { nodes: vec![(node.node, node.place, 1.0)], frame, relative: false },
         inside: BeamPoint { beam: number, fraction, elasticity: elasticity.to_vec(), sides, frame },
         compliance: std::array::from_fn(|i| std::array::from_fn(|j| compliance[(i, j)])),
+        section,
     }
 }

@@ -17,6 +17,7 @@ mod path;
 mod planar;
 mod rehearsal;
 mod section;
+mod stress;
 mod surfaces;
 mod switches;
 
@@ -26,6 +27,7 @@ pub use curve::{NaturalSpline, Spline};
 pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
 pub use section::matrices as section_matrices;
+pub use stress::recovery as section_stresses;
 
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody, Target,
@@ -36,14 +38,16 @@ use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::integrate::Scheme;
 use beamsim_core::model::{ElementInfo, ModelParts, StageKind};
-use beamsim_core::probe::{Figure, Need, Probe};
+use beamsim_core::probe::{Figure, Need, Probe, ProfilePlace, StressPlace};
 use beamsim_core::run::{Approach, InitialMotion, Plan, Snapshot, Stage, StageWork, TimeStepping, Until, Warning};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
 use constraints::SceneConstraints;
+use figure::SectionsAtNodes;
 use output::Columns;
 use std::sync::Arc;
+use stress::SectionStresses;
 
 /// A deck made ready to run.
 pub struct Scene {
@@ -57,6 +61,10 @@ pub struct Scene {
     pub every: usize,
     /// True if fields are written for ParaView
     pub vtk: bool,
+    /// Places at which the largest stresses of a run are followed, if they are
+    pub envelope: Option<Vec<StressPlace>>,
+    /// Places of which resultants are written at the end of each stage, if they are
+    pub profile: Option<Vec<ProfilePlace>>,
     /// Expectations
     pub expectations: Vec<Expectation>,
     /// Warnings about the deck itself, where the scene was built by [`from_deck`]
@@ -73,12 +81,14 @@ pub struct Scene {
     pub resolved: serde_json::Value,
     /// Beam elasticity, the source of stress resultants
     elasticity: Vec<Arc<dyn StressField>>,
+    /// Sections whose stresses fields show; empty where no stresses are wanted
+    sections_at_nodes: SectionsAtNodes,
 }
 
 impl Scene {
     /// Its whole shape, for pictures.
     pub fn figure(&self) -> Figure {
-        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity)
+        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity, &self.sections_at_nodes)
     }
 
     /// All texts of the deck that may name a place on a beam.
@@ -289,8 +299,12 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         driven.push(compose::DrivenTable { drives: beamsim_core::run::Driven::Motion(motions.len()), ..slid.table });
         motions.push(slid.motion);
     }
-    let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity };
+    let stresses = SectionStresses::new(deck);
+    let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity, stresses: &stresses };
     let probes = columns.written(&mut found);
+    let envelope = deck.output.envelope.as_ref().map(|span| columns.stress_places(span, &mut found));
+    let profile = deck.output.profile.as_ref().map(|span| columns.profile_places(span));
+    let sections_at_nodes = if shows_stress(deck) { columns.sections_at_nodes() } else { Vec::new() };
     let stages = stages(deck, &columns, &mut found);
     let expectations = expectations(deck, &columns, &mut found);
     let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
@@ -336,6 +350,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         probes,
         every: deck.output.every,
         vtk: deck.output.vtk,
+        envelope,
+        profile,
         expectations,
         warnings: Vec::new(),
         reasons: [vec![planar], composition.reasons].concat(),
@@ -344,7 +360,15 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         links: composition.links,
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
+        sections_at_nodes,
     })
+}
+
+/// True if fields show stresses: those of a deck that asks for stresses.
+fn shows_stress(deck: &Deck) -> bool {
+    let output = &deck.output;
+    let has_columns = output.columns.iter().flatten().any(|key| key.value == "stress");
+    output.vtk && (has_columns || output.envelope.is_some() || output.profile.is_some())
 }
 
 /// The coordinates of a point that a deck gives by its name or its coordinates.

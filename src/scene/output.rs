@@ -1,19 +1,24 @@
 //! The columns that a deck writes or watches, found by name and bound to nodes, beams and the
 //! scene.
 
-use super::mesh::Mesh;
+use super::figure::SectionsAtNodes;
+use super::mesh::{Mesh, MeshBeam};
 use super::names::{Found, unknown};
-use crate::deck::{Contact, Deck, Diagnostic, ExpectBody, Spanned, hint, nearest, one_of};
+use super::stress::SectionStresses;
+use crate::deck::{Contact, Deck, Diagnostic, ExpectBody, Span, Spanned, hint, nearest, one_of};
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::probe::{
-    BeamPoint, COLUMNS, ColumnGroup, ENERGY_WITH_CONTACTS, Need, Place, Probe, Reading, Source, clocks, find_column,
-    group,
+    BeamPoint, COLUMNS, ColumnGroup, ENERGY_WITH_CONTACTS, Need, Place, Probe, ProfilePlace, Reading, STRESS_AT_POINT,
+    STRESS_WITH_INDEX, Source, StressPlace, StressPoint, clocks, find_column, group,
 };
 use beamsim_core::system::Node;
 use std::sync::Arc;
 
 /// Groups that are written where a deck asks for none.
 const DEFAULT_GROUPS: [&str; 2] = ["u", "r"];
+
+/// Distance of two places on a beam, as a part of its length, that is round-off.
+const SAME_PLACE: f64 = 1e-9;
 
 /// Finder of columns by their names.
 pub struct Columns<'a> {
@@ -23,6 +28,8 @@ pub struct Columns<'a> {
     pub mesh: &'a Mesh,
     /// Elasticity of the scene, for strains and resultants
     pub elasticity: &'a [Arc<dyn StressField>],
+    /// Stresses of sections
+    pub stresses: &'a SectionStresses<'a>,
 }
 
 impl Columns<'_> {
@@ -36,6 +43,9 @@ impl Columns<'_> {
                     Ok(probe) => probes.push(probe),
                     Err(diagnostic) => diagnostics.push(diagnostic),
                 }
+            }
+            if groups.iter().any(|group| is_stress(group)) {
+                self.add_stress_points(&node, &mut probes, diagnostics);
             }
             probes.extend(self.line_contact(&node, &groups));
         }
@@ -88,14 +98,132 @@ impl Columns<'_> {
     fn node_probe(&self, name: &Spanned<String>, group: &'static ColumnGroup) -> Result<Probe, Diagnostic> {
         let found = self.mesh.find(self.deck, name)?;
         let place = self.mesh.place(&found);
+        if is_stress(group) {
+            return self.stress_probe(name);
+        }
         let reading = match group.source {
             Source::Place(read) => Reading::Place(place, read),
             Source::Node(read) => Reading::Node(node_of(&place, name)?, read),
             Source::BeamPoint(read) => Reading::BeamPoint(self.beam_point(name, &found)?, read),
-            Source::Contact(_) => return Err(no_column(name)),
+            Source::Stress(_) | Source::StressPoint(_) | Source::Contact(_) => return Err(no_column(name)),
             Source::Scene(read) | Source::Run(read) => Reading::Whole(read),
         };
         Ok(Probe { names: group.names_at(&name.value), group, reading })
+    }
+
+    /// Probe of the largest stresses at a place on a beam, with the failure index where the section has
+    /// strengths.
+    fn stress_probe(&self, name: &Spanned<String>) -> Result<Probe, Diagnostic> {
+        let inside = self.beam_point(name, &self.mesh.find(self.deck, name)?)?;
+        let beam = &self.mesh.beams[inside.beam].name;
+        let section = self.stresses.at(beam, inside.fraction, &name.span)?;
+        let plain = group("stress").ok_or_else(|| no_column(name))?;
+        let group = if section.has_strength() { &STRESS_WITH_INDEX } else { plain };
+        let Source::Stress(read) = group.source else { return Err(no_column(name)) };
+        let names = group.names_at(&name.value);
+        Ok(Probe { names, group, reading: Reading::Stress(StressPlace { inside, section }, read) })
+    }
+
+    /// Probe of the stresses at a point of the section at a place on a beam: `arm@0.5` and `top`.
+    fn point_probe(&self, name: &Spanned<String>, point: &str) -> Result<Probe, Diagnostic> {
+        let inside = self.beam_point(name, &self.mesh.find(self.deck, name)?)?;
+        let beam = &self.mesh.beams[inside.beam].name;
+        let points = self.stresses.points(beam, inside.fraction);
+        let Some(known) = points.iter().find(|known| known.name.value == point) else {
+            let message = format!("the section at `{}` has no point `{point}`", name.value);
+            let help = "name it in [section.NAME]: probe = { NAME = [x2, x3] }";
+            return Err(Diagnostic::error(message, name.span.clone()).help(help));
+        };
+        let stress = self.stresses.at_point(beam, inside.fraction, known, &name.span)?;
+        let Source::StressPoint(read) = STRESS_AT_POINT.source else { return Err(no_column(name)) };
+        let names = STRESS_AT_POINT.names_at(&format!("{}.{point}", name.value));
+        let reading = Reading::StressPoint(StressPoint { inside, stress }, read);
+        Ok(Probe { names, group: &STRESS_AT_POINT, reading })
+    }
+
+    /// Adds the stresses at all points of the section at a node.
+    fn add_stress_points(&self, node: &Spanned<String>, probes: &mut Vec<Probe>, diagnostics: &mut Vec<Diagnostic>) {
+        // What is wrong with the place has been told with the largest stresses.
+        let Some(inside) = self.mesh.find(self.deck, node).ok().and_then(|at| self.beam_point(node, &at).ok()) else {
+            return;
+        };
+        for point in self.stresses.points(&self.mesh.beams[inside.beam].name, inside.fraction) {
+            match self.point_probe(node, &point.name.value) {
+                Ok(probe) => probes.push(probe),
+                Err(diagnostic) => diagnostics.push(diagnostic),
+            }
+        }
+    }
+
+    /// Probe and component of a column of stresses, by its name.
+    fn find_stress(&self, name: &Spanned<String>) -> Result<(Probe, usize), Diagnostic> {
+        let (owner, suffix) = name.value.rsplit_once('.').ok_or_else(|| no_column(name))?;
+        let is_point = |point: &str| self.deck.sections.iter().flat_map(|s| &s.probes).any(|p| p.name.value == point);
+        let at = |place: &str| Spanned { value: place.to_string(), span: name.span.clone() };
+        let probe = match owner.rsplit_once('.') {
+            Some((place, point)) if is_point(point) => self.point_probe(&at(place), point)?,
+            Some(_) | None => self.stress_probe(&at(owner))?,
+        };
+        match probe.group.component(suffix) {
+            Some(component) => Ok((probe, component)),
+            None if suffix == "index" => {
+                let message = format!("`{}` needs a `strength` or `strain_limit` of a material", name.value);
+                Err(Diagnostic::error(message, name.span.clone()))
+            }
+            None => Err(no_column(name).help("give the name of a point of the section: `arm@0.5.top.s11`")),
+        }
+    }
+
+    /// Places along beams at which the largest stresses are followed. Places between sections without
+    /// a shape of their own are left out; beams without any stress are errors about `span`.
+    pub fn stress_places(&self, span: &Span, diagnostics: &mut Vec<Diagnostic>) -> Vec<StressPlace> {
+        let mut places = Vec::new();
+        for (number, beam) in self.mesh.beams.iter().enumerate() {
+            let mut failed = None;
+            let before = places.len();
+            for fraction in self.fractions(number) {
+                match self.stresses.at(&beam.name, fraction, span) {
+                    Ok(section) => places.push(StressPlace { inside: self.inside(number, fraction), section }),
+                    Err(diagnostic) => failed = Some(diagnostic),
+                }
+            }
+            if places.len() == before {
+                diagnostics.extend(failed);
+            }
+        }
+        places
+    }
+
+    /// Places along beams of which resultants are written, with the stresses of their sections where
+    /// they are known.
+    pub fn profile_places(&self, span: &Span) -> Vec<ProfilePlace> {
+        let of_beam = |number: usize| {
+            let place = move |fraction: f64| {
+                let section = self.stresses.at(&self.mesh.beams[number].name, fraction, span).ok();
+                ProfilePlace { inside: self.inside(number, fraction), section }
+            };
+            self.fractions(number).into_iter().map(place)
+        };
+        (0..self.mesh.beams.len()).flat_map(of_beam).collect()
+    }
+
+    /// Stresses of the sections at the nodes of each beam, where they are known.
+    pub fn sections_at_nodes(&self) -> SectionsAtNodes {
+        let of_beam = |beam: &MeshBeam| {
+            let section = |&fraction: &f64| self.stresses.at(&beam.name, fraction, &(0..0)).ok();
+            beam.fractions.iter().map(section).collect()
+        };
+        self.mesh.beams.iter().map(of_beam).collect()
+    }
+
+    /// Fractions of the length of the nodes and the stations of a beam.
+    fn fractions(&self, number: usize) -> Vec<f64> {
+        let beam = &self.mesh.beams[number];
+        let stations = self.stresses.stations(&beam.name);
+        let mut fractions: Vec<f64> = beam.fractions.iter().copied().chain(stations).collect();
+        fractions.sort_by(f64::total_cmp);
+        fractions.dedup_by(|a, b| (*a - *b).abs() <= SAME_PLACE);
+        fractions
     }
 
     /// Forces of contacts per length at a node of a beam, which the group `contact` has, too.
@@ -133,19 +261,18 @@ impl Columns<'_> {
                     .help(format!("name the place on a beam, such as `{}@{end}`", self.mesh.beams[first].name))
             });
         };
+        Ok(self.inside(number, fraction))
+    }
+
+    /// The point at a fraction of the length of a beam, with both sides where it is a node.
+    fn inside(&self, number: usize, fraction: f64) -> BeamPoint {
         let beam = &self.mesh.beams[number];
         let (element, xi) = beam.element_at(fraction);
         let mut sides = vec![(element as u32, xi)];
         if xi > 1.0 - 1e-9 && element + 1 < beam.elements.end {
             sides.push((element as u32 + 1, -1.0));
         }
-        Ok(BeamPoint {
-            beam: number,
-            fraction,
-            elasticity: self.elasticity.to_vec(),
-            sides,
-            frame: beam.frame(fraction),
-        })
+        BeamPoint { beam: number, fraction, elasticity: self.elasticity.to_vec(), sides, frame: beam.frame(fraction) }
     }
 
     /// Probe and component of a column, by its name.
@@ -153,6 +280,9 @@ impl Columns<'_> {
         let (group, component) = column_of(self.deck, &name.value).ok_or_else(|| no_column(name))?;
         if let Some(probe) = whole_probe(group) {
             return Ok((probe, component));
+        }
+        if is_stress(group) {
+            return self.find_stress(name);
         }
         let node = name.value.rsplit_once('.').map_or("", |(node, _)| node);
         if group.is_of_contact() {
@@ -206,8 +336,18 @@ fn whole_probe(group: &'static ColumnGroup) -> Option<Probe> {
         Source::Scene(read) | Source::Run(read) => {
             Some(Probe { names: group.own_names(), group, reading: Reading::Whole(read) })
         }
-        Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) | Source::Contact(_) => None,
+        Source::Place(_)
+        | Source::Node(_)
+        | Source::BeamPoint(_)
+        | Source::Stress(_)
+        | Source::StressPoint(_)
+        | Source::Contact(_) => None,
     }
+}
+
+/// True for columns of stresses, whose groups depend on the section.
+fn is_stress(group: &ColumnGroup) -> bool {
+    matches!(group.source, Source::Stress(_) | Source::StressPoint(_))
 }
 
 fn node_of(place: &Place, name: &Spanned<String>) -> Result<Node, Diagnostic> {

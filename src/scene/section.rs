@@ -166,7 +166,8 @@ fn mix(a: f64, b: f64, s: f64) -> f64 {
     a + (b - a) * s
 }
 
-fn blend_shapes(shapes: &[Shape; 2], s: f64) -> Shape {
+/// The shape between two of one kind, with dimensions linear along the way.
+pub fn blend_shapes(shapes: &[Shape; 2], s: f64) -> Shape {
     match (shapes[0], shapes[1]) {
         (Shape::Circle { radius: a }, Shape::Circle { radius: b }) => Shape::Circle { radius: mix(a, b, s) },
         (Shape::Tube { radius: a, thickness: ta }, Shape::Tube { radius: b, thickness: tb }) => {
@@ -264,6 +265,7 @@ pub fn taper(ends: [&deck::Section; 2], deck: &Deck) -> Result<SectionCourse, Di
     Ok(SectionCourse::Blended([matrices(ends[0], deck)?, matrices(ends[1], deck)?]))
 }
 
+/// The material with this name.
 pub fn find_material<'a>(
     name: &Spanned<String>,
     materials: &'a [deck::Material],

@@ -3,8 +3,9 @@
 use beamsim::deck::{self, Deck};
 use beamsim::scene;
 use beamsim_core::model::SectionMatrices;
-use beamsim_core::section::Matrix6;
 use beamsim_core::section::properties::{Properties, moved, relative_difference, turned};
+use beamsim_core::section::recovery::{Measure, Recovery};
+use beamsim_core::section::{Matrix6, Vector6};
 use serde_json::Value;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -169,6 +170,49 @@ fn reference_and_turn_move_closed_forms_and_computed_sections() {
         let expected = turned(&moved(&own, [0.5, -2.0]), -0.3);
         assert!(relative_difference(&placed, &expected) < 1e-12);
         assert_eq!(own[(0, 4)], 0.0);
+    }
+}
+
+/// Stresses of the section `s`.
+fn stresses(text: &str) -> Recovery {
+    let deck = read(text);
+    let section = deck.sections.iter().find(|section| section.name.value == "s").unwrap();
+    scene::section_stresses(section, &deck, &section.name.span)
+        .unwrap_or_else(|found| panic!("{}\n{text}", found.message))
+}
+
+#[test]
+fn closed_forms_and_computed_sections_have_the_same_stresses() {
+    let shapes = [
+        "shape = \"circle\"\nradius = 5",
+        "shape = \"tube\"\nradius = 5\nthickness = 1",
+        "shape = \"rectangle\"\nwidth = 4\nheight = 7",
+    ];
+    let loads = [
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        [2.0, -3.0, 1.0, 4.0, 5.0, -6.0],
+        [-1.0, 5.0, 5.0, -4.0, 1.0, 0.5],
+    ];
+    for shape in shapes {
+        for placed in ["", "reference = [0.5, -2]\nturn = 0.3\n"] {
+            let of = |more: &str| {
+                let section = format!("[section.s]\nmaterial = \"steel\"\n{shape}\n{placed}{more}\n");
+                stresses(&format!("{STEEL}{section}"))
+            };
+            let [closed, computed] = [of(""), of("mesh = 1e-5")];
+            for load in loads {
+                let load = Vector6::from(load);
+                for (measure, name, _) in Measure::ALL {
+                    let value = |section: &Recovery| section.largest(measure, &load, f64::NEG_INFINITY).unwrap().value;
+                    let [exact, found] = [value(&closed), value(&computed)];
+                    let scale = closed.largest(Measure::VonMises, &load, 0.0).unwrap().value;
+                    assert!((found - exact).abs() < 1e-2 * scale, "{shape} {placed} {load} {name}: {found} {exact}");
+                }
+            }
+        }
     }
 }
 

@@ -4,10 +4,12 @@
 //! A new group of columns is a row of [`COLUMNS`] and the function that reads it. Histories,
 //! expectations, error scales, pictures and the report ask the row.
 
-use super::place::{BeamPoint, Place};
+use super::place::{BeamPoint, Place, StressPlace, StressPoint};
 use crate::kernel::inertia::Spin;
 use crate::rotation::{Rotation, Series, principal};
 use crate::run::Snapshot;
+use crate::section::recovery::Measure;
+use crate::section::stress::von_mises;
 use crate::system::Node;
 use crate::tensor::Vec3;
 use std::f64::consts::TAU;
@@ -49,6 +51,10 @@ pub enum Source {
     Node(fn(Node, &Snapshot, &mut Vec<f64>)),
     /// A point of one beam
     BeamPoint(fn(&BeamPoint, &Snapshot, &mut Vec<f64>)),
+    /// A section of one beam with its stresses
+    Stress(fn(&StressPlace, &Snapshot, &mut Vec<f64>)),
+    /// A fixed point of such a section
+    StressPoint(fn(&StressPoint, &Snapshot, &mut Vec<f64>)),
     /// A contact, by its number
     Contact(fn(usize, &Snapshot, &mut Vec<f64>)),
     /// The whole scene
@@ -102,6 +108,10 @@ pub enum Quantity {
     Strain,
     /// Changes of curvature and twist per length
     Curvature,
+    /// Stress in a section
+    Stress,
+    /// Stress relative to the strength of the material
+    FailureIndex,
     /// Energies, all measured against the largest: the error of their sum is that of the scheme
     Energy,
     /// Momentum
@@ -179,7 +189,7 @@ pub enum MeshError {
 
 /// All groups: those of nodes, of the whole scene, and of the run. Where suffixes stand in two
 /// groups, the first is meant unless a deck writes the other.
-pub static COLUMNS: [ColumnGroup; 20] = [
+pub static COLUMNS: [ColumnGroup; 21] = [
     ColumnGroup {
         key: "u",
         parts: &[part("displacement", Quantity::Displacement, &["ux", "uy", "uz"])],
@@ -285,6 +295,13 @@ pub static COLUMNS: [ColumnGroup; 20] = [
         nearest: None,
     },
     ColumnGroup {
+        key: "stress",
+        parts: &[LARGEST_STRESSES],
+        source: Source::Stress(largest_stresses),
+        needs: &[],
+        nearest: None,
+    },
+    ColumnGroup {
         key: "line_contact",
         parts: &[part("contact force per length", Quantity::ContactForcePerLength, &["cn", "cf"])],
         source: Source::BeamPoint(|point, at, out| {
@@ -363,6 +380,33 @@ pub static ENERGY_WITH_CONTACTS: ColumnGroup = ColumnGroup {
     nearest: None,
 };
 
+/// The columns of `stress` in sections with strengths.
+pub static STRESS_WITH_INDEX: ColumnGroup = ColumnGroup {
+    key: "stress",
+    parts: &[LARGEST_STRESSES, part("failure index", Quantity::FailureIndex, &["index"])],
+    source: Source::Stress(largest_stresses_with_index),
+    needs: &[],
+    nearest: None,
+};
+
+/// The columns of `stress` at fixed points of sections.
+pub static STRESS_AT_POINT: ColumnGroup = ColumnGroup {
+    key: "stress",
+    parts: &[part("stress", Quantity::Stress, &["s11", "s22", "s33", "s23", "s13", "s12", "vm"])],
+    source: Source::StressPoint(|point, at, out| {
+        let stress = point.stress.unit * point.inside.resultant(at.state, at.origin);
+        out.extend(stress.iter());
+        out.push(von_mises(&stress));
+    }),
+    needs: &[],
+    nearest: None,
+};
+
+/// Largest stresses over a section: von Mises, first and third principal stress, stress along the
+/// beam, shear.
+const LARGEST_STRESSES: ColumnPart =
+    part("stress", Quantity::Stress, &["vm", "s1max", "s1min", "s11max", "s11min", "tau"]);
+
 /// Columns of modes and critical loads, which have the number of a mode before the dot.
 static MODE_COLUMNS: [ColumnPart; 3] = [
     part("angular frequency", Quantity::AngularFrequency, &["omega"]),
@@ -394,7 +438,10 @@ pub fn find_column(name: &str) -> Option<(&'static ColumnGroup, usize)> {
     let component = |group: &'static ColumnGroup| Some((group, group.component(suffix)?));
     match of_scene {
         Some(group) => component(group).or_else(|| component(&ENERGY_WITH_CONTACTS).filter(|_| group.key == "energy")),
-        None => COLUMNS.iter().filter(|group| group.is_of_node() || group.is_of_contact()).find_map(component),
+        None => {
+            let others = [&STRESS_WITH_INDEX, &STRESS_AT_POINT];
+            COLUMNS.iter().filter(|group| group.is_of_node() || group.is_of_contact()).chain(others).find_map(component)
+        }
     }
 }
 
@@ -442,14 +489,16 @@ impl ColumnGroup {
     /// True if the columns belong to a node, or a place on a beam.
     pub fn is_of_node(&self) -> bool {
         match self.source {
-            Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) => true,
+            Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) | Source::Stress(_) | Source::StressPoint(_) => {
+                true
+            }
             Source::Contact(_) | Source::Scene(_) | Source::Run(_) => false,
         }
     }
 
     /// True if the columns belong to a section of one beam, which need not be at a node.
     pub fn is_of_section(&self) -> bool {
-        matches!(self.source, Source::BeamPoint(_))
+        matches!(self.source, Source::BeamPoint(_) | Source::Stress(_) | Source::StressPoint(_))
     }
 
     /// True if the columns belong to a contact.
@@ -478,7 +527,7 @@ impl ColumnGroup {
 
 impl Quantity {
     /// All quantities.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 32] = [
         Self::Displacement,
         Self::Position,
         Self::Rotation,
@@ -494,6 +543,8 @@ impl Quantity {
         Self::SectionMoment,
         Self::Strain,
         Self::Curvature,
+        Self::Stress,
+        Self::FailureIndex,
         Self::Energy,
         Self::Momentum,
         Self::AngularMomentum,
@@ -517,9 +568,11 @@ impl Quantity {
             Self::Orientation
             | Self::SectionAxis
             | Self::Strain
+            | Self::FailureIndex
             | Self::ContactPoints
             | Self::Stage
             | Self::LoadFactor => Dimension::NUMBER,
+            Self::Stress => Dimension { length: -2, ..Dimension::FORCE },
             Self::Rotation => Dimension::ANGLE,
             Self::AngularVelocity | Self::AngularFrequency => Dimension::ANGLE.times_time(-1),
             Self::AngularAcceleration => Dimension::ANGLE.times_time(-2),
@@ -559,6 +612,8 @@ impl Quantity {
             | Self::ReactionMoment
             | Self::SectionMoment
             | Self::Curvature
+            | Self::Stress
+            | Self::FailureIndex
             | Self::Energy
             | Self::Momentum
             | Self::AngularMomentum
@@ -599,6 +654,8 @@ impl Quantity {
             | Self::ReactionMoment
             | Self::Strain
             | Self::Curvature
+            | Self::Stress
+            | Self::FailureIndex
             | Self::Momentum
             | Self::AngularMomentum
             | Self::CentreOfMass
@@ -659,6 +716,22 @@ fn reaction(node: Node, at: &Snapshot, out: &mut Vec<f64>) {
     // In linear stages moments are conjugate to rotation vectors about the origin.
     let rotation_vector = at.origin.unwrap_or(state).q[node.p as usize];
     out.extend((Rotation::new(rotation_vector).t_inverse() * (held(node.p) - moment)).0);
+}
+
+/// Largest and smallest stresses over a section.
+fn largest_stresses(place: &StressPlace, at: &Snapshot, out: &mut Vec<f64>) {
+    let load = place.inside.resultant(at.state, at.origin);
+    for (measure, _, sign) in Measure::ALL {
+        let found = place.section.largest(measure, &load, f64::NEG_INFINITY);
+        out.push(found.map_or(f64::NAN, |peak| sign * peak.value));
+    }
+}
+
+/// Largest and smallest stresses over a section, and its failure index.
+fn largest_stresses_with_index(place: &StressPlace, at: &Snapshot, out: &mut Vec<f64>) {
+    largest_stresses(place, at, out);
+    let load = place.inside.resultant(at.state, at.origin);
+    out.push(place.section.largest_index(&load, f64::NEG_INFINITY).map_or(f64::NAN, |peak| peak.value));
 }
 
 /// The energy account.
@@ -745,6 +818,8 @@ mod tests {
         assert_eq!(found("momentum.cx"), Some(("momentum", 6)));
         assert_eq!(found("tip.rz"), Some(("r", 2)));
         assert_eq!(found("load"), Some(("load", 0)));
+        assert_eq!([found("arm@0.5.vm"), found("arm@0.5.index")], [Some(("stress", 0)), Some(("stress", 6))]);
+        assert_eq!(found("arm@0.5.top.s12"), Some(("stress", 5)));
         assert_eq!([found("energy.ux"), found("tip.total"), found("ux"), found("tip.load")], [None; 4]);
         assert_eq!(quantity("tip.my"), Some(Quantity::ReactionMoment));
         assert_eq!(quantity("tip.d3x"), Some(Quantity::SectionAxis));

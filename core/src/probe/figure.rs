@@ -3,8 +3,11 @@
 
 use super::place::{BeamPoint, Place};
 use crate::rotation::{Rotation, principal};
+use crate::section::Vector6;
+use crate::section::recovery::{Measure, Recovery};
 use crate::system::State;
 use crate::tensor::{Mat3, Vec3};
+use std::sync::Arc;
 
 /// The shape of a scene.
 #[derive(Clone, Default)]
@@ -37,6 +40,8 @@ pub struct LinePoint {
     pub inside: BeamPoint,
     /// Compliance: strains over resultants, section axes
     pub compliance: [[f64; 6]; 6],
+    /// Stresses of the section, where they are wanted and known
+    pub section: Option<Arc<Recovery>>,
 }
 
 /// Motion, strains and resultants of a node at a state.
@@ -67,6 +72,23 @@ impl Figure {
         let points = self.lines.iter().flat_map(|line| &line.points);
         let others = self.bodies.iter().chain(self.links.as_flattened());
         points.map(|point| point.look(state, origin)).chain(others.map(|place| bare(place, state))).collect()
+    }
+
+    /// Largest von Mises stress of the section at each look; not a number where it is not known.
+    /// `None` if it is known nowhere.
+    pub fn von_mises(&self, looks: &[Look]) -> Option<Vec<f64>> {
+        let points = || self.lines.iter().flat_map(|line| &line.points);
+        points().find(|point| point.section.is_some())?;
+        let of_section = |section: &Recovery, look: &Look| {
+            let load = Vector6::from(look.resultant);
+            Some(section.largest(Measure::VonMises, &load, f64::NEG_INFINITY)?.value)
+        };
+        let of_point = |(point, look): (&LinePoint, &Look)| {
+            point.section.as_ref().and_then(|section| of_section(section, look)).unwrap_or(f64::NAN)
+        };
+        let mut values: Vec<f64> = points().zip(looks).map(of_point).collect();
+        values.resize(looks.len(), f64::NAN);
+        Some(values)
     }
 
     /// Number of nodes of beams.

@@ -2,14 +2,18 @@
 //! these.
 
 mod columns;
+mod envelope;
 mod figure;
 mod place;
+mod profile;
 mod reading;
 
 pub use columns::{
-    COLUMNS, ColumnGroup, ColumnPart, Dimension, ENERGY_WITH_CONTACTS, MeshError, Nearest, Need, Quantity, Source,
-    clocks, find_column, find_part, group, quantity,
+    COLUMNS, ColumnGroup, ColumnPart, Dimension, ENERGY_WITH_CONTACTS, MeshError, Nearest, Need, Quantity,
+    STRESS_AT_POINT, STRESS_WITH_INDEX, Source, clocks, find_column, find_part, group, quantity,
 };
+pub use envelope::{Envelope, Extreme, Extremes};
 pub use figure::{Figure, Line, LinePoint, Look};
-pub use place::{BeamPoint, Place};
+pub use place::{BeamPoint, Place, StressPlace, StressPoint};
+pub use profile::{Profile, ProfilePlace, StageEnd};
 pub use reading::{Probe, Reading};

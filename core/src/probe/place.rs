@@ -8,6 +8,8 @@ use crate::kernel::seam::{Converted, conversion};
 use crate::kernel::shape::gauss;
 use crate::rotation::{Rotation, log};
 use crate::scalar::Jet;
+use crate::section::Vector6;
+use crate::section::recovery::{PointStress, Recovery};
 use crate::system::{Node, State};
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
@@ -117,7 +119,30 @@ pub struct BeamPoint {
     pub frame: Mat3,
 }
 
+/// A point of a beam with the stresses of its section.
+#[derive(Clone)]
+pub struct StressPlace {
+    /// The point, for resultants
+    pub inside: BeamPoint,
+    /// The section there
+    pub section: Arc<Recovery>,
+}
+
+/// A fixed point of the section at a point of a beam.
+#[derive(Clone)]
+pub struct StressPoint {
+    /// The point of the beam, for resultants
+    pub inside: BeamPoint,
+    /// Stresses there under unit resultants
+    pub stress: PointStress,
+}
+
 impl BeamPoint {
+    /// N and M in section axes, see [`strain_and_stress`](Self::strain_and_stress).
+    pub fn resultant(&self, state: &State, origin: Option<&State>) -> Vector6 {
+        Vector6::from(self.strain_and_stress(state, origin)[1])
+    }
+
     /// Gamma and K, then N and M, in section axes: values at Gauss points extrapolated within the
     /// element, mean of both sides. `origin` is the state about which the stage is linear; `None`
     /// in other stages.

@@ -1,7 +1,7 @@
 //! Columns bound to the node, beam point or scene that they are read from.
 
 use super::columns::ColumnGroup;
-use super::place::{BeamPoint, Place};
+use super::place::{BeamPoint, Place, StressPlace, StressPoint};
 use crate::run::Snapshot;
 use crate::system::Node;
 
@@ -25,6 +25,10 @@ pub enum Reading {
     Node(Node, fn(Node, &Snapshot, &mut Vec<f64>)),
     /// A point of one beam
     BeamPoint(BeamPoint, fn(&BeamPoint, &Snapshot, &mut Vec<f64>)),
+    /// A section of one beam with its stresses
+    Stress(StressPlace, fn(&StressPlace, &Snapshot, &mut Vec<f64>)),
+    /// A fixed point of such a section
+    StressPoint(StressPoint, fn(&StressPoint, &Snapshot, &mut Vec<f64>)),
     /// A contact, by its number
     Contact(usize, fn(usize, &Snapshot, &mut Vec<f64>)),
     /// The whole scene, or the clocks of the run
@@ -38,6 +42,8 @@ impl Probe {
             Reading::Place(place, read) => read(place, at, out),
             Reading::Node(node, read) => read(*node, at, out),
             Reading::BeamPoint(point, read) => read(point, at, out),
+            Reading::Stress(place, read) => read(place, at, out),
+            Reading::StressPoint(point, read) => read(point, at, out),
             Reading::Contact(number, read) => read(*number, at, out),
             Reading::Whole(read) => read(at, out),
         }
@@ -47,7 +53,12 @@ impl Probe {
     pub fn place(&self) -> Option<&Place> {
         match &self.reading {
             Reading::Place(place, _) => Some(place),
-            Reading::Node(..) | Reading::BeamPoint(..) | Reading::Contact(..) | Reading::Whole(_) => None,
+            Reading::Node(..)
+            | Reading::BeamPoint(..)
+            | Reading::Stress(..)
+            | Reading::StressPoint(..)
+            | Reading::Contact(..)
+            | Reading::Whole(_) => None,
         }
     }
 }

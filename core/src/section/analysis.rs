@@ -10,6 +10,7 @@ use super::saint_venant::{Solution, solve};
 use super::stress::NodalStresses;
 use super::{Matrix6, Point, Vector6};
 use crate::interrupt;
+use std::sync::OnceLock;
 
 /// The aimed error of the stiffness where none is given
 pub const DEFAULT_AIM: f64 = 1e-3;
@@ -76,6 +77,8 @@ pub struct Analysis {
     pub meets_aim: bool,
     /// Level of the mesh
     pub level: usize,
+    /// Stresses under unit resultants, found when they are asked for
+    stresses: OnceLock<Result<NodalStresses, SectionError>>,
 }
 
 /// The aim of a mesh.
@@ -134,7 +137,8 @@ impl Computed {
     }
 
     fn finish(self, estimate: f64, meets_aim: bool) -> Analysis {
-        Analysis { mesh: self.mesh, solution: self.solution, estimate, meets_aim, level: self.level }
+        let Self { mesh, solution, level } = self;
+        Analysis { mesh, solution, estimate, meets_aim, level, stresses: OnceLock::new() }
     }
 }
 
@@ -210,8 +214,9 @@ impl Analysis {
         warnings
     }
 
-    /// Stresses under unit resultants.
-    pub fn stresses(&self, materials: &[Material]) -> Result<NodalStresses, SectionError> {
-        NodalStresses::new(&self.mesh, materials, &self.solution)
+    /// Stresses under unit resultants, computed once. The materials are those of the analysis.
+    pub fn stresses(&self, materials: &[Material]) -> Result<&NodalStresses, SectionError> {
+        let stresses = self.stresses.get_or_init(|| NodalStresses::new(&self.mesh, materials, &self.solution));
+        stresses.as_ref().map_err(Clone::clone)
     }
 }

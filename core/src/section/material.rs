@@ -98,7 +98,7 @@ impl Material {
     }
 
     /// The compliance in material axes.
-    fn compliance(&self) -> Matrix6 {
+    pub fn compliance(&self) -> Matrix6 {
         let (e, g, nu) = match self.elastic {
             Elastic::Isotropic { e, nu } => ([e; 3], [0.5 * e / (1.0 + nu); 3], [nu; 3]),
             Elastic::Orthotropic { e, g, nu } => (e, g, nu),

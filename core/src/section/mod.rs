@@ -12,12 +12,14 @@
 //! The way through the files: [`geometry`] (what the shape is) makes a [`mesh`] with
 //! [`element`]s of oriented [`material`]s; [`saint_venant`] solves on it; [`properties`] derives
 //! centres and principal axes, [`stress`] recovers stresses, [`strength`] compares them with those
-//! that a material bears; [`analysis`] chooses the mesh so that
+//! that a material bears; [`closed`] has stresses in closed form, and [`recovery`] those of a section
+//! on a beam, whose largest one [`search`] finds; [`analysis`] chooses the mesh so that
 //! its estimated error meets an aim.
 
 pub mod airfoil;
 pub mod analysis;
 pub mod blocks;
+pub mod closed;
 pub mod divide;
 pub mod element;
 pub mod error;
@@ -27,8 +29,10 @@ pub mod material;
 pub mod mesh;
 pub mod outline;
 pub mod properties;
+pub mod recovery;
 pub mod rings;
 pub mod saint_venant;
+pub mod search;
 pub mod strength;
 pub mod stress;
 pub mod triangulate;

@@ -3,6 +3,8 @@
 //! All measures are strength ratios inverted: 1 at failure, and proportional to the load.
 
 use super::Vector6;
+use super::material::Material;
+use super::stress::von_mises;
 
 /// Strengths in the axes of an orthotropic material, all positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +53,33 @@ impl Strengths {
         let [first, second, third] = square_roots;
         quadratic -= first * second + first * third + second * third;
         // 1 / R from R = (-b + sqrt(b^2 + 4 a)) / (2 a), written without a division by a.
-        0.5 * (linear + (linear * linear + 4.0 * quadratic).sqrt())
+        0.5 * (linear + (linear * linear + 4.0 * quadratic.max(0.0)).sqrt())
+    }
+}
+
+/// What a material bears: the largest of the indices of its laws counts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FailureLaw {
+    /// Von Mises stress at yield
+    pub yield_stress: Option<f64>,
+    /// Strengths in the axes of the material, after Tsai and Wu
+    pub strengths: Option<Strengths>,
+    /// Strain along the fibre per stress in material axes, over the largest strain
+    pub fibre_strain: Option<Vector6>,
+}
+
+impl FailureLaw {
+    /// With a largest strain along the fibre of a material.
+    pub fn with_strain_limit(self, material: &Material, limit: f64) -> Self {
+        Self { fibre_strain: Some(material.compliance().row(0).transpose() / limit), ..self }
+    }
+
+    /// The index of a stress in material axes.
+    pub fn index(&self, stress: &Vector6) -> f64 {
+        let yielding = self.yield_stress.map_or(0.0, |limit| von_mises(stress) / limit);
+        let breaking = self.strengths.map_or(0.0, |strengths| strengths.tsai_wu_index(stress));
+        let straining = self.fibre_strain.map_or(0.0, |strain| strain.dot(stress).abs());
+        yielding.max(breaking).max(straining)
     }
 }
 

@@ -101,6 +101,17 @@ impl NodalStresses {
         Ok(stresses)
     }
 
+    /// Indices of the places that a search looks at. If corners leave none, all are.
+    pub fn kept(&self, mesh: &Mesh, corners: Corners) -> Vec<usize> {
+        let all = 0..self.places.len();
+        let is_kept = |&index: &usize| !is_near_corner(mesh, mesh.nodes[self.places[index].node as usize]);
+        let kept: Vec<usize> = match corners {
+            Corners::Include => all.collect(),
+            Corners::Exclude => all.filter(is_kept).collect(),
+        };
+        if kept.is_empty() { (0..self.places.len()).collect() } else { kept }
+    }
+
     /// The largest value of a measure of the stress under a load (N1 to M3).
     pub fn largest(
         &self,
@@ -109,22 +120,22 @@ impl NodalStresses {
         corners: Corners,
         measure: impl Fn(&Vector6) -> f64,
     ) -> Option<Peak> {
-        let near_corner = |at: Point| {
-            corners == Corners::Exclude
-                && mesh
-                    .corners
-                    .iter()
-                    .any(|corner| libm::hypot(at[0] - corner.at[0], at[1] - corner.at[1]) < corner.wall)
-        };
         let mut largest: Option<Peak> = None;
-        for (place, unit) in self.places.iter().zip(&self.unit) {
-            let at = mesh.nodes[place.node as usize];
-            let value = measure(&(unit * load));
-            if largest.is_none_or(|peak| value > peak.value) && !near_corner(at) {
-                largest = Some(Peak { value, at, region: place.region as usize });
+        for index in self.kept(mesh, corners) {
+            let place = self.places[index];
+            let value = measure(&(self.unit[index] * load));
+            if largest.is_none_or(|peak| value > peak.value) {
+                largest = Some(Peak { value, at: mesh.nodes[place.node as usize], region: place.region as usize });
             }
         }
         largest
+    }
+
+    /// Mean of a measure of the stress over the nodes of each element under a load (N1 to M3).
+    pub fn of_elements(&self, load: &Vector6, measure: impl Fn(&Vector6) -> f64) -> Vec<f64> {
+        let of_place = |&place: &u32| measure(&(self.unit[place as usize] * load));
+        let mean = |places: &Vec<u32>| places.iter().map(of_place).sum::<f64>() / places.len() as f64;
+        self.of_element.iter().map(mean).collect()
     }
 
     /// Unit stresses at a point, for each region that contains it: two on an interface.
@@ -157,6 +168,11 @@ impl Probe {
     pub fn stress_in_material_axes(&self, load: &Vector6) -> Vector6 {
         stress_in_material_axes(&self.stress(load), &material_axes(self.beta, self.theta))
     }
+}
+
+/// True if a point is nearer to a re-entrant corner than the thickness of the wall.
+fn is_near_corner(mesh: &Mesh, at: Point) -> bool {
+    mesh.corners.iter().any(|corner| libm::hypot(at[0] - corner.at[0], at[1] - corner.at[1]) < corner.wall)
 }
 
 /// Unit stresses at the nodes of an element.
@@ -222,6 +238,21 @@ pub fn principal_stresses(s: &Vector6) -> [f64; 3] {
     values
 }
 
+/// The first and the third principal stress, by the trigonometric solution of the cubic equation.
+pub fn extreme_principal_stresses(s: &Vector6) -> [f64; 2] {
+    let mean = (s[0] + s[1] + s[2]) / 3.0;
+    let [a, b, c] = [s[0] - mean, s[1] - mean, s[2] - mean];
+    let shear = s[3] * s[3] + s[4] * s[4] + s[5] * s[5];
+    let size = ((a * a + b * b + c * c + 2.0 * shear) / 6.0).sqrt();
+    if size == 0.0 {
+        return [mean; 2];
+    }
+    let determinant = a * (b * c - s[3] * s[3]) - s[5] * (s[5] * c - s[3] * s[4]) + s[4] * (s[5] * s[3] - b * s[4]);
+    let cosine = (0.5 * determinant / (size * size * size)).clamp(-1.0, 1.0);
+    let angle = libm::acos(cosine) / 3.0;
+    [mean + 2.0 * size * libm::cos(angle), mean + 2.0 * size * libm::cos(angle + 2.0 / 3.0 * std::f64::consts::PI)]
+}
+
 /// The largest shear stress on any plane.
 pub fn largest_shear(s: &Vector6) -> f64 {
     let [high, _, low] = principal_stresses(s);
@@ -239,5 +270,17 @@ mod tests {
         let principal = principal_stresses(&s);
         assert!((principal[0] - 2.0).abs() < 1e-12 && (principal[2] + 2.0).abs() < 1e-12);
         assert!((largest_shear(&s) - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn principal_stresses_of_the_cubic_equation_are_eigenvalues() {
+        for case in 0..50 {
+            let s =
+                Vector6::from_fn(|i, _| libm::sin((7 * case + 3 * i) as f64) * if case % 3 == 0 { 1e6 } else { 1.0 });
+            let [first, _, third] = principal_stresses(&s);
+            let found = extreme_principal_stresses(&s);
+            assert!((found[0] - first).abs().max((found[1] - third).abs()) < 1e-9 * s.amax(), "{s}");
+        }
+        assert_eq!(extreme_principal_stresses(&Vector6::new(2.0, 2.0, 2.0, 0.0, 0.0, 0.0)), [2.0; 2]);
     }
 }

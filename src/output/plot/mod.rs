@@ -15,7 +15,7 @@ mod text;
 mod ticks;
 
 pub use line_plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale};
-pub use section_picture::SectionPicture;
+pub use section_picture::{SectionPicture, StressShade};
 
 use layout::Layout;
 

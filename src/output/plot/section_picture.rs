@@ -1,4 +1,5 @@
-//! Pictures of a section: its mesh, coloured by material, with its centres, or by its warping.
+//! Pictures of a section: its mesh, coloured by material, with its centres, or by its warping or
+//! stress.
 
 use super::svg::{Anchor, BACKGROUND, INK, LINES, MUTED, PAPER, Stroke, Svg, Text, Theme};
 use super::text;
@@ -34,6 +35,18 @@ pub struct SectionPicture<'a> {
     pub points: Vec<(&'static str, Point)>,
     /// Displacement of each node along axis 1 in the place of the materials
     pub warping: Option<Vec<f64>>,
+    /// Stress of each element in the place of the materials
+    pub stress: Option<StressShade>,
+}
+
+/// Stresses as colours.
+pub struct StressShade {
+    /// Stress of each element
+    pub of_elements: Vec<f64>,
+    /// The stress of the full colour
+    pub largest: f64,
+    /// Meaning of the full colour
+    pub legend: String,
 }
 
 /// From the coordinates of the mesh to pixels.
@@ -83,9 +96,10 @@ impl SectionPicture<'_> {
         svg.rectangle(0.0, 0.0, width, height, PAPER);
         let title = text::cut(&self.title, 16.0, WIDTH);
         svg.text(label(&title, (MARGIN, MARGIN), 16.0));
-        match &self.warping {
-            Some(warping) => self.draw_warping(warping, &frame, &mut svg),
-            None => self.draw_materials(&frame, &mut svg),
+        match (&self.warping, &self.stress) {
+            (Some(warping), _) => self.draw_warping(warping, &frame, &mut svg),
+            (None, Some(stress)) => self.draw_stress(stress, &frame, &mut svg),
+            (None, None) => self.draw_materials(&frame, &mut svg),
         }
         svg.path(&self.sides(&frame), Stroke::solid(BACKGROUND, 0.3));
         let mut y = frame.height + 2.5 * MARGIN;
@@ -111,9 +125,12 @@ impl SectionPicture<'_> {
 
     /// Meanings of colours.
     fn legend(&self) -> Vec<String> {
-        match self.warping {
-            Some(_) => ["backwards (in the sense of -1)", "forwards (in the sense of +1)"].map(str::to_string).to_vec(),
-            None => self.materials.clone(),
+        match (&self.warping, &self.stress) {
+            (Some(_), _) => {
+                ["backwards (in the sense of -1)", "forwards (in the sense of +1)"].map(str::to_string).to_vec()
+            }
+            (None, Some(stress)) => vec![stress.legend.clone()],
+            (None, None) => self.materials.clone(),
         }
     }
 
@@ -133,6 +150,14 @@ impl SectionPicture<'_> {
             let mean = nodes.iter().map(|&node| warping[node as usize]).sum::<f64>() / (nodes.len() as f64 * largest);
             let colour = LINES[if mean < 0.0 { 0 } else { 1 }];
             svg.filled_path(&self.outline_of(element, frame), colour, (100.0 * mean.abs()).round() / 100.0);
+        }
+    }
+
+    /// The larger the stress of an element, the stronger is its colour.
+    fn draw_stress(&self, stress: &StressShade, frame: &Frame, svg: &mut Svg) {
+        for (element, value) in self.mesh.elements.iter().zip(&stress.of_elements) {
+            let part = (value / stress.largest.max(f64::MIN_POSITIVE)).min(1.0);
+            svg.filled_path(&self.outline_of(element, frame), LINES[0], (100.0 * part).round() / 100.0);
         }
     }
 

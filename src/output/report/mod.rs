@@ -8,7 +8,7 @@ pub use film::{Film, Reel};
 
 use super::ownership::GENERATOR;
 use super::{HistoryReader, OutputError, PartFile, Record, Units};
-use beamsim_core::probe::{COLUMNS, ColumnGroup, ColumnPart};
+use beamsim_core::probe::{COLUMNS, ColumnGroup, ColumnPart, STRESS_AT_POINT, STRESS_WITH_INDEX};
 use encode::base64;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -99,7 +99,8 @@ fn is_bar(names: &[String], k: usize) -> bool {
 /// Rows of the table of columns: columns that share a picture, with the group of the whole scene
 /// that they belong to, if they do.
 fn parts() -> Vec<Value> {
-    let of_history = COLUMNS.iter().filter(|group| group.is_of_node() || group.is_of_scene());
+    let all = COLUMNS.iter().chain([&STRESS_WITH_INDEX, &STRESS_AT_POINT]);
+    let of_history = all.filter(|group| group.is_of_node() || group.is_of_scene());
     let of_group = |group: &'static ColumnGroup| {
         let scene = group.is_of_scene().then_some(group.key);
         let of_section = group.is_of_section();

@@ -1,0 +1,274 @@
+//! Stresses of the sections of a deck at places on its beams.
+
+use super::computed::{self, Solution, SolvedSection};
+use super::names;
+use super::section::{blend_shapes, find_material};
+use crate::deck::{
+    self, Beam, ComputedSection, ComputedShape, CornerWord, Deck, Diagnostic, Elastic, SectionBody, Shape, Span,
+    Strength,
+};
+use beamsim_core::section::closed::{ClosedForm, ClosedShape};
+use beamsim_core::section::material::Material;
+use beamsim_core::section::recovery::{Placement, PointStress, Recovery};
+use beamsim_core::section::strength::{FailureLaw, Strengths};
+use beamsim_core::section::stress::Corners;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Distance of a place from a station, as a part of the length, that is round-off
+const AT_STATION: f64 = 1e-9;
+
+/// The section at a place of a beam.
+enum Found<'d> {
+    /// One of the deck
+    Named(&'d deck::Section),
+    /// Between two, at a part of the way
+    Between([&'d deck::Section; 2], f64),
+}
+
+/// Finder of the stresses of sections; each is made once.
+pub struct SectionStresses<'d> {
+    deck: &'d Deck,
+    made: RefCell<HashMap<String, Arc<Recovery>>>,
+}
+
+impl<'d> SectionStresses<'d> {
+    /// For the sections of a deck.
+    pub fn new(deck: &'d Deck) -> Self {
+        Self { deck, made: RefCell::new(HashMap::new()) }
+    }
+
+    /// The section at a fraction of the length of a beam; errors are about `span`.
+    pub fn at(&self, beam: &str, fraction: f64, span: &Span) -> Result<Arc<Recovery>, Diagnostic> {
+        match self.find(beam, fraction, span)? {
+            Found::Named(section) => self.of_section(section, span),
+            Found::Between(ends, along) => self.between(ends, along, (beam, fraction), span),
+        }
+    }
+
+    /// Stresses at a fixed point of the section at a fraction of the length of a beam.
+    pub fn at_point(
+        &self,
+        beam: &str,
+        fraction: f64,
+        point: &deck::SectionProbe,
+        span: &Span,
+    ) -> Result<PointStress, Diagnostic> {
+        let Found::Named(section) = self.find(beam, fraction, span)? else {
+            let message = format!(
+                "the section of beam `{beam}` varies there, so that it has no point `{}`: ask for it where the \
+                 section is one of the deck",
+                point.name.value
+            );
+            return Err(Diagnostic::error(message, span.clone()));
+        };
+        let stresses = self.of_section(section, span)?;
+        let solved = solved(section, self.deck, span)?;
+        let found = match &solved.solution {
+            None => stresses.at(point.at, None),
+            Some(Solution { analysis, materials, .. }) => {
+                let field = analysis.stresses(materials).map_err(|error| broken(section, &error, span))?;
+                let is_oriented =
+                    |region: &beamsim_core::section::mesh::Region| !materials[region.material].is_isotropic();
+                let is_oriented: Vec<bool> = analysis.mesh.regions.iter().map(is_oriented).collect();
+                stresses.at(point.at, Some((&analysis.mesh, field, &is_oriented)))
+            }
+        };
+        found.ok_or_else(|| {
+            let [x2, x3] = point.at;
+            let message = format!(
+                "the point `{}` at [{x2}, {x3}] lies outside section `{}`",
+                point.name.value, section.name.value
+            );
+            let help = "`probe` takes coordinates of the shape, as `beamsim section` shows them";
+            Diagnostic::error(message, point.name.span.clone()).help(help)
+        })
+    }
+
+    /// The points of the section at a place, if it is one of the deck.
+    pub fn points(&self, beam: &str, fraction: f64) -> &'d [deck::SectionProbe] {
+        match self.find(beam, fraction, &(0..0)) {
+            Ok(Found::Named(section)) => &section.probes,
+            Ok(Found::Between(..)) | Err(_) => &[],
+        }
+    }
+
+    /// Fractions of the length at which a beam has a section of the deck by its stations.
+    pub fn stations(&self, beam: &str) -> Vec<f64> {
+        let found = self.deck.beams.iter().find(|known| known.name.value == beam);
+        found.map_or(Vec::new(), stations)
+    }
+
+    fn find(&self, beam: &str, fraction: f64, span: &Span) -> Result<Found<'d>, Diagnostic> {
+        let known = self.deck.beams.iter().find(|known| known.name.value == beam);
+        let known = known.ok_or_else(|| Diagnostic::error(format!("there is no beam `{beam}`"), span.clone()))?;
+        let section = |k: usize| {
+            let name = &known.sections[k];
+            let found = self.deck.sections.iter().find(|section| section.name.value == name.value);
+            let all = self.deck.sections.iter().map(|section| section.name.value.as_str());
+            found.ok_or_else(|| names::unknown("section", name, all))
+        };
+        let stations = stations(known);
+        if let Some(k) = stations.iter().position(|station| (station - fraction).abs() <= AT_STATION) {
+            return section(k).map(Found::Named);
+        }
+        let next = stations.partition_point(|&station| station <= fraction).clamp(1, stations.len().max(2) - 1);
+        let [start, end] = [next - 1, next.min(known.sections.len() - 1)];
+        if known.sections[start].value == known.sections[end].value {
+            return section(start).map(Found::Named);
+        }
+        let along = (fraction - stations[start]) / (stations[end] - stations[start]);
+        Ok(Found::Between([section(start)?, section(end)?], along.clamp(0.0, 1.0)))
+    }
+
+    fn of_section(&self, section: &deck::Section, span: &Span) -> Result<Arc<Recovery>, Diagnostic> {
+        if let Some(made) = self.made.borrow().get(&section.name.value) {
+            return Ok(made.clone());
+        }
+        let made = Arc::new(recovery(section, self.deck, span)?);
+        self.made.borrow_mut().insert(section.name.value.clone(), made.clone());
+        Ok(made)
+    }
+
+    /// Between two circles, tubes or rectangles of one isotropic material dimensions are linear, as in
+    /// the stiffness. Other sections in between have no shape.
+    fn between(
+        &self,
+        ends: [&deck::Section; 2],
+        along: f64,
+        (beam, fraction): (&str, f64),
+        span: &Span,
+    ) -> Result<Arc<Recovery>, Diagnostic> {
+        let [first, second] = ends;
+        if let (
+            SectionBody::Shaped { shape: a, material, .. },
+            SectionBody::Shaped { shape: b, material: of_second, .. },
+        ) = (&first.body, &second.body)
+        {
+            let found = find_material(material, &self.deck.materials)?;
+            let is_alike = std::mem::discriminant(a) == std::mem::discriminant(b) && material.value == of_second.value;
+            if let (true, Elastic::Isotropic(elastic)) = (is_alike, found.elastic) {
+                let form = closed_form(&blend_shapes(&[*a, *b], along), elastic.poisson);
+                let law = failure_law(found);
+                let name = format!("{}-{}", first.name.value, second.name.value);
+                return Ok(Arc::new(Recovery::closed(&name, form, Placement::default(), law)));
+            }
+        }
+        for section in ends {
+            self.of_section(section, span)?;
+        }
+        let message = format!(
+            "the stress between the sections `{}` and `{}` is not known at {fraction} of beam `{beam}`: their \
+             stiffness is interpolated there, but not their shape",
+            first.name.value, second.name.value
+        );
+        let stations: Vec<String> = self.stations(beam).iter().map(|at| format!("`{beam}@{at}`")).collect();
+        let help = format!("ask for it where the section is one of the deck: {}", stations.join(", "));
+        Err(Diagnostic::error(message, span.clone()).help(help))
+    }
+}
+
+/// Places of the sections of a beam as fractions of its length.
+fn stations(beam: &Beam) -> Vec<f64> {
+    match (&beam.stations, beam.sections.len()) {
+        (Some(stations), _) => {
+            let last = stations.value.last().copied().unwrap_or(1.0);
+            stations.value.iter().map(|station| station / last).collect()
+        }
+        (None, 2) => vec![0.0, 1.0],
+        (None, _) => vec![0.0],
+    }
+}
+
+/// The solution of a section that has a shape.
+fn solved(section: &deck::Section, deck: &Deck, span: &Span) -> Result<SolvedSection, Diagnostic> {
+    computed::solved(section, deck).unwrap_or_else(|| {
+        let message = format!("section `{}` has no stress: it is given by numbers, not by a shape", section.name.value);
+        let help = "give its `shape` and `material`, and `beamsim section` shows the stiffness that follows";
+        Err(Diagnostic::error(message, span.clone()).help(help))
+    })
+}
+
+/// The stresses of a section of the deck.
+pub fn recovery(section: &deck::Section, deck: &Deck, span: &Span) -> Result<Recovery, Diagnostic> {
+    let SolvedSection { solution, place, .. } = solved(section, deck, span)?;
+    let name = &section.name.value;
+    let turn = match &section.body {
+        SectionBody::Computed(body) => body.turn,
+        SectionBody::Shaped { .. } | SectionBody::Resultants { .. } | SectionBody::Full { .. } => 0.0,
+    };
+    let Some(Solution { analysis, materials, origin }) = solution else {
+        let (form, law) = closed(section, deck)?;
+        return Ok(Recovery::closed(name, form, Placement { line: place, turn, origin: [0.0; 2] }, law));
+    };
+    let line = [place[0] - origin[0], place[1] - origin[1]];
+    let placement = Placement { line, turn, origin };
+    let law = |material: &Material| {
+        let of_deck = deck.materials.iter().find(|known| known.name.value == material.name)?;
+        failure_law(of_deck)
+    };
+    let laws: Vec<Option<FailureLaw>> = materials.iter().map(law).collect();
+    let corners = match section.corner {
+        CornerWord::Exclude => Corners::Exclude,
+        CornerWord::Include => Corners::Include,
+    };
+    let field = analysis.stresses(&materials).map_err(|error| broken(section, &error, span))?;
+    Ok(Recovery::computed(name, &analysis.mesh, field, placement, corners, &laws))
+}
+
+fn broken(section: &deck::Section, error: &beamsim_core::section::SectionError, span: &Span) -> Diagnostic {
+    Diagnostic::error(format!("section `{}`: {error}", section.name.value), span.clone())
+}
+
+/// The closed form of a circle, tube or rectangle, with the law of its material.
+fn closed(section: &deck::Section, deck: &Deck) -> Result<(ClosedForm, Option<FailureLaw>), Diagnostic> {
+    let of_body = |shape: &Shape, material: &deck::Spanned<String>| {
+        let found = find_material(material, &deck.materials)?;
+        let poisson = match found.elastic {
+            Elastic::Isotropic(elastic) => elastic.poisson,
+            Elastic::Orthotropic { .. } => 0.0,
+        };
+        Ok((closed_form(shape, poisson), failure_law(found)))
+    };
+    match &section.body {
+        SectionBody::Shaped { shape, material, .. } => of_body(shape, material),
+        SectionBody::Computed(body) => match &**body {
+            ComputedSection { shape: ComputedShape::Solid(shape), material: Some(material), .. } => {
+                of_body(shape, material)
+            }
+            _ => Err(Diagnostic::error("a section without a closed form", section.name.span.clone())),
+        },
+        SectionBody::Resultants { .. } | SectionBody::Full { .. } => {
+            Err(Diagnostic::error("a section without a shape", section.name.span.clone()))
+        }
+    }
+}
+
+fn closed_form(shape: &Shape, nu: f64) -> ClosedForm {
+    let shape = match *shape {
+        Shape::Circle { radius } => ClosedShape::Ring { radii: [0.0, radius] },
+        Shape::Tube { radius, thickness } => ClosedShape::Ring { radii: [radius - thickness, radius] },
+        Shape::Rectangle { width, height } => ClosedShape::Rectangle { half: [0.5 * width, 0.5 * height] },
+    };
+    ClosedForm { shape, nu }
+}
+
+/// The law of a material that has strengths.
+fn failure_law(material: &deck::Material) -> Option<FailureLaw> {
+    if material.strength.is_none() && material.strain_limit.is_none() {
+        return None;
+    }
+    let mut law = FailureLaw::default();
+    match material.strength {
+        None => {}
+        Some(Strength::Yield(stress)) => law.yield_stress = Some(stress),
+        Some(Strength::Ply { tension, compression, shear: [s12, s13, s23] }) => {
+            law.strengths = Some(Strengths { tension, compression, shear: [s23, s13, s12] });
+        }
+    }
+    let Some(limit) = material.strain_limit else { return Some(law) };
+    let own =
+        Material { name: material.name.value.clone(), elastic: computed::elastic_of(&material.elastic), density: 0.0 };
+    Some(law.with_strain_limit(&own, limit))
+}
