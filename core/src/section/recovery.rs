@@ -101,6 +101,10 @@ impl Placement {
     }
 }
 
+/// Points of the materials of one law, each by its index with the angles beta and theta of its
+/// fibres in rad.
+type PointsOfLaw = (Option<FailureLaw>, Vec<(u32, [f64; 2])>);
+
 /// A search tree with the spread of one measure, found when it is needed.
 #[derive(Clone, Debug)]
 struct FailureSearch {
@@ -168,8 +172,7 @@ impl Recovery {
         laws: &[Option<FailureLaw>],
     ) -> Self {
         let kept = stresses.kept(mesh, corners);
-        let mut by_law: Vec<(Option<FailureLaw>, Vec<(u32, [f64; 2])>)> =
-            laws.iter().map(|law| (law.clone(), Vec::new())).collect();
+        let mut by_law: Vec<PointsOfLaw> = laws.iter().map(|law| (law.clone(), Vec::new())).collect();
         let mut points = Vec::new();
         let mut units = Vec::new();
         for &index in &kept {
@@ -193,7 +196,7 @@ impl Recovery {
         placement: Placement,
         points: Vec<(Point, u32)>,
         mut units: Vec<Matrix6>,
-        laws: Vec<(Option<FailureLaw>, Vec<(u32, [f64; 2])>)>,
+        laws: Vec<PointsOfLaw>,
     ) -> Self {
         let to_field = placement.to_field();
         units.iter_mut().for_each(|unit| *unit *= to_field);

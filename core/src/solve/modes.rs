@@ -336,15 +336,21 @@ impl<'a> ModeSearch<'a> {
     pub fn nearest(&mut self, wanted: usize) -> Option<Vec<SmallMotion>> {
         let room = self.room(wanted);
         let diagonal = self.inner_product();
-        let spectrum = largest_eigenvalues(&mut ModeOperator { search: self, diagonal }, room)?;
-        let allowed = match self.form {
-            ProblemForm::Symmetric => MAX_RESIDUAL_OF_SYMMETRIC,
-            ProblemForm::Undamped | ProblemForm::Gyroscopic | ProblemForm::General => MAX_RESIDUAL,
-        };
-        let is_right = |number: &usize| spectrum.values[*number].norm() > 0.0 && spectrum.residual(*number) <= allowed;
+        let mut operator = ModeOperator { search: self, diagonal };
+        let spectrum = largest_eigenvalues(&mut operator, room)?;
+        let mut right = Vec::new();
+        for number in 0..spectrum.values.len() {
+            let theta = spectrum.values[number];
+            if theta.norm() == 0.0 || !operator.search.is_told(theta) {
+                continue;
+            }
+            if spectrum.residual(&mut operator, number)? <= operator.search.allowed_residual() {
+                right.push(number);
+            }
+        }
         self.look_at_stiffness();
         let mut motions = Vec::new();
-        for number in (0..spectrum.values.len()).filter(is_right) {
+        for number in right {
             if interrupt::is_requested() {
                 return None;
             }
@@ -386,6 +392,14 @@ impl<'a> ModeSearch<'a> {
         Some(GrowthNearby { exponents, growing })
     }
 
+    /// Relative residual up to which an eigenvector of the operator is a motion.
+    fn allowed_residual(&self) -> f64 {
+        match self.form {
+            ProblemForm::Symmetric => MAX_RESIDUAL_OF_SYMMETRIC,
+            ProblemForm::Undamped | ProblemForm::Gyroscopic | ProblemForm::General => MAX_RESIDUAL,
+        }
+    }
+
     /// Number of eigenvalues of the operator that belong to this number of motions.
     fn room(&self, motions: usize) -> usize {
         match self.form {
@@ -405,10 +419,15 @@ impl<'a> ModeSearch<'a> {
     /// the other, or if verification fails.
     fn motion(&self, spectrum: &Spectrum, number: usize) -> Option<SmallMotion> {
         let theta = spectrum.values[number];
+        if self.is_told(theta) { self.check(spectrum, number, self.form.exponent(self.shift, theta)) } else { None }
+    }
+
+    /// True for one eigenvalue of the operator of each conjugate pair.
+    fn is_told(&self, theta: Complex<f64>) -> bool {
         let exponent = self.form.exponent(self.shift, theta);
         let is_upper = exponent.im > 0.0 || (exponent.im == 0.0 && theta.im >= 0.0);
         let is_twin = self.form == ProblemForm::Gyroscopic && exponent.im == 0.0 && exponent.re < 0.0;
-        if is_upper && !is_twin { self.check(spectrum, number, exponent) } else { None }
+        is_upper && !is_twin
     }
 
     /// A verified motion: multiplied by x* from the left, m s^2 + c s + k = 0. `None` if the terms
