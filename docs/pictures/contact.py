@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-DECKS = HERE.parent.parent / "decks" / "contact"
+DECKS = HERE.parent.parent / "decks"
 BEAMSIM = Path(sys.argv[1]).resolve()
 WIDTH, MOST_HEIGHT, MARGIN = 780, 460, 30  # pixels
 FIRST, LAST = (0xC6, 0xDB, 0xEF), (0x08, 0x30, 0x6B)  # colours of the first and of the last row
@@ -26,6 +26,11 @@ def side(point):
     return point[0], -point[2]
 
 
+def top(point):
+    """Seen along z."""
+    return point[0], -point[1]
+
+
 def oblique(point):
     """Seen from above at an angle."""
     x, y, z = point
@@ -34,7 +39,7 @@ def oblique(point):
 
 @dataclass
 class Scene:
-    deck: str
+    deck: str  # in decks/, without the ending
     beams: list
     view: object = side
     rows: int = 6  # rows that are drawn, at equal parts of the history; 1: the last
@@ -54,9 +59,11 @@ def circle(centre, radius, axes):
 
 
 SCENES = {
-    "mast": Scene("mast_unfolds", ["first", "second", "third"], rows=9, surfaces=[[[-0.1, 0, 0], [3.2, 0, 0]]]),
+    "mast": Scene("contact/scenes/mast_unfolds", ["first", "second", "third"], rows=9, surfaces=[[[-0.1, 0, 0], [3.2, 0, 0]]]),
+    "coil": Scene("contact/coil_spring_closes", ["coil"], rows=2, places=400),
+    "guidewire": Scene("contact/scenes/guidewire", ["wire"], view=top, rows=4, places=300),
     "winch": Scene(
-        "winch", ["cable"], view=oblique, rows=1, places=240,
+        "contact/scenes/winch", ["cable"], view=oblique, rows=1, places=240,
         surfaces=[circle([0, y, 0], 0.1, (0, 2)) for y in (-0.02, 0.08)],
     ),
 }

@@ -30,6 +30,8 @@ pub struct Spectrum {
     /// Coordinates of each eigenvector in the basis
     coordinates: Vec<Vec<Complex<f64>>>,
     space: KrylovSpace,
+    /// True if no eigenvalue that was wanted is missing, of multiple ones at least one
+    pub(crate) is_complete: bool,
 }
 
 /// Size of the basis of a rough estimate of eigenvalues
@@ -84,12 +86,14 @@ pub fn distinct_eigenvalues_until(
             continue;
         }
         let pairs = space.pairs(operator.is_symmetric(), wanted)?;
+        let is_all = pairs.len() == wanted || space.applied() == space.basis.len();
         let count = pairs.len();
         let converged: Vec<Eigenpair> =
             pairs.into_iter().filter(|(value, x)| space.residual(*value, x) <= RESIDUAL_TOLERANCE).collect();
-        let is_complete = count == wanted && converged.len() == count;
-        if !grows || is_complete || converged.iter().any(|(value, _)| is_enough(*value)) {
-            return Some(Spectrum::of(converged, space));
+        let is_complete = is_all && converged.len() == count;
+        let is_end = !grows || (is_complete && count == wanted);
+        if is_end || converged.iter().any(|(value, _)| is_enough(*value)) {
+            return Some(Spectrum { is_complete, ..Spectrum::of(converged, space) });
         }
         looks.plan(space.applied(), converged.len());
     }
@@ -153,7 +157,7 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
 impl Spectrum {
     fn of(pairs: Vec<Eigenpair>, space: KrylovSpace) -> Self {
         let (values, coordinates) = pairs.into_iter().unzip();
-        Self { values, coordinates, space }
+        Self { values, coordinates, space, is_complete: true }
     }
 
     /// Real and imaginary part of an eigenvector.

@@ -71,6 +71,8 @@ pub struct GrowthNearby {
     pub(crate) exponents: Vec<Complex<f64>>,
     /// Verified motions that grow
     pub(crate) growing: Vec<SmallMotion>,
+    /// False if motions may be missing, or seem to grow and could not be verified
+    pub(crate) is_sure: bool,
 }
 
 /// Shape of a small motion.
@@ -380,16 +382,20 @@ impl<'a> ModeSearch<'a> {
         let spectrum = distinct_eigenvalues_until(&mut ModeOperator { search: self, diagonal }, room, &ends)?;
         let exponents: Vec<Complex<f64>> = spectrum.values.iter().map(|&theta| form.exponent(shift, theta)).collect();
         self.look_at_stiffness();
-        let growing: Vec<SmallMotion> = (0..exponents.len())
-            .filter(|&number| exponents[number].re > MIN_GROWTH_RATIO * exponents[number].norm())
-            .filter_map(|number| self.motion(&spectrum, number))
-            .collect();
+        let seems = |number: &usize| {
+            let exponent = exponents[*number];
+            exponent.re > MIN_GROWTH_RATIO * exponent.norm() && self.is_told(spectrum.values[*number])
+        };
+        let found: Vec<Option<SmallMotion>> =
+            (0..exponents.len()).filter(seems).map(|number| self.motion(&spectrum, number)).collect();
+        let is_sure = spectrum.is_complete && found.iter().all(Option::is_some);
+        let growing: Vec<SmallMotion> = found.into_iter().flatten().collect();
         let is_confirmed = growing.iter().any(|motion| is_enough(motion.exponent));
         if !is_confirmed && spectrum.values.iter().any(|&theta| ends(theta)) {
             // Others may be missing.
             return if self.factorise(shift) { self.growth(wanted, f64::INFINITY) } else { None };
         }
-        Some(GrowthNearby { exponents, growing })
+        Some(GrowthNearby { exponents, growing, is_sure })
     }
 
     /// Relative residual up to which an eigenvector of the operator is a motion.

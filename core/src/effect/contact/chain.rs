@@ -8,8 +8,10 @@
 
 use super::strand::{ChainNode, Strand};
 use crate::kernel::MAX_NODES;
-use crate::kernel::contact::along::weighted_sum;
-use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
+use crate::kernel::contact::along::{slopes, weighted_sum};
+use crate::kernel::contact::{
+    Carrier, Distance, Edge, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima,
+};
 use crate::system::{ChainMemory, State};
 use crate::tensor::Vec3;
 use std::ops::Deref;
@@ -281,22 +283,39 @@ impl SeenChain<'_> {
         is_sharp
     }
 
-    /// The closest points of element `k` to the edges of a box. Nodes beside them may touch a face.
+    /// The points of element `k` that are closest to an edge of a box, with its first node, and its
+    /// last one at the end of the chain. Nodes keep their own contact, since they may touch a face.
     fn closest_to_edges(&self, k: usize) -> Vec<Candidate> {
         let mut found = Vec::new();
         for number in self.surface.edges() {
             let Some(edge) = self.surface.edge(number) else { continue };
+            let is_beside = |s: f64| edge.is_beside(self.place(k, s));
+            let at = |s: f64, place: Place| Candidate { element: k, s, place, edge: Some(number) };
             let minima = self.minima(k, &|y| edge.distance(y).ok());
-            let sharp = minima.found().iter().filter(|minimum| minimum.kind == MinimumKind::Sharp);
-            let beside = sharp.filter(|minimum| edge.is_beside(self.place(k, minimum.s)));
-            found.extend(beside.map(|minimum| Candidate {
-                element: k,
-                s: minimum.s,
-                place: Place::Closest,
-                edge: Some(number),
-            }));
+            let smooth = minima.found().iter().filter(|minimum| minimum.kind != MinimumKind::Kink);
+            found.extend(smooth.filter(|minimum| is_beside(minimum.s)).map(|minimum| at(minimum.s, Place::Closest)));
+            let falls = |k: usize, s: f64| self.slope(k, s, &edge).is_some_and(|slope| slope < 0.0);
+            let is_last = k + 1 == self.chain.elements();
+            if (k == 0 || falls(k - 1, 1.0)) && !falls(k, 0.0) && is_beside(0.0) {
+                found.push(at(0.0, Place::Fixed));
+            }
+            if is_last && falls(k, 1.0) && is_beside(1.0) {
+                found.push(at(1.0, Place::Fixed));
+            }
         }
         found
+    }
+
+    /// The slope over s of the distance of a point of element `k` from an edge.
+    fn slope(&self, k: usize, s: f64, edge: &Edge) -> Option<f64> {
+        let distance = edge.distance(self.place(k, s)).ok()?;
+        let slopes = match self.places_of(k) {
+            [a, b] => slopes(&[*a, *b], &ShapeAt::new(s), &distance),
+            [a, b, c] => slopes(&[*a, *b, *c], &ShapeAt::new(s), &distance),
+            [a, b, c, d] => slopes(&[*a, *b, *c, *d], &ShapeAt::new(s), &distance),
+            _ => return None,
+        };
+        Some(slopes.first)
     }
 
     /// Adds the nodes of near elements that are not beside a closest point.

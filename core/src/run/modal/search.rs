@@ -143,11 +143,18 @@ fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> 
     Some(found)
 }
 
-/// Verified motions that grow, among the `modes` slowest and among those around shifts further out
-/// that these do not reach. The search ends as soon as one grows by more than the part `enough` of
-/// its |s|. K must be the matrix factorised last. `None` where a solution fails, or nothing is
-/// found.
-pub fn find_growth(search: &mut ModeSearch, modes: usize, enough: f64) -> Option<Vec<SmallMotion>> {
+/// Motions that grow.
+pub struct Growth {
+    /// The motions, verified
+    pub growing: Vec<SmallMotion>,
+    /// False if others may have been missed
+    pub is_sure: bool,
+}
+
+/// Motions that grow, among the `modes` slowest and among those around shifts further out that these
+/// do not reach. The search ends as soon as one grows by more than the part `enough` of its |s|. K
+/// must be the matrix factorised last. `None` where a solution fails, or nothing is found.
+pub fn find_growth(search: &mut ModeSearch, modes: usize, enough: f64) -> Option<Growth> {
     let shift = SHIFT * search.slowest_frequency()?;
     if !search.factorise(shift) {
         return None;
@@ -157,16 +164,17 @@ pub fn find_growth(search: &mut ModeSearch, modes: usize, enough: f64) -> Option
     if slowest.exponents.is_empty() {
         return None;
     }
-    let mut growing = slowest.growing;
+    let mut growth = Growth { growing: slowest.growing, is_sure: slowest.is_sure };
     let is_enough = |motion: &SmallMotion| motion.exponent.re > enough * motion.exponent.norm();
     for further in unseen(search, &slowest.exponents, shift).filter(|_| !is_held) {
-        if growing.iter().any(is_enough) {
+        if growth.growing.iter().any(is_enough) {
             break;
         }
-        let found = search.factorise(further).then(|| search.growth(SPARE, enough)).flatten();
-        growing.extend(found.map(|found| found.growing).unwrap_or_default());
+        if let Some(found) = search.factorise(further).then(|| search.growth(SPARE, enough)).flatten() {
+            growth.growing.extend(found.growing);
+        }
     }
-    Some(growing)
+    Some(growth)
 }
 
 /// Shifts further out that motions with these exponents, nearest to `shift`, do not reach.

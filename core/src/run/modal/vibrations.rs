@@ -8,7 +8,7 @@
 //! positive for large s. Without masses no more is known: for each K that is not symmetric there
 //! are masses with which something grows.
 
-use super::search::{find_growth, matrices};
+use super::search::{Growth, find_growth, matrices};
 use crate::model::{Assembly, StageContext, StageKind};
 use crate::run::failure::Failure;
 use crate::run::results::Mode;
@@ -89,16 +89,16 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
     let mut search = ModeSearch::new(&mut assembly.system, &mut solver, &matrices, Vec::new());
     let found = timed(&mut counters.work.solve_seconds, || find_growth(&mut search, MODES, ENOUGH_GROWTH));
     counters.work.factorisations += search.factorisations;
-    Ok(found.map_or(Vibrations::Unknown, |growing| judge(&growing)))
+    Ok(found.map_or(Vibrations::Unknown, |growth| judge(&growth)))
 }
 
 /// The verdict of the motions that grow.
-fn judge(growing: &[SmallMotion]) -> Vibrations {
+fn judge(growth: &Growth) -> Vibrations {
     let surely = |motion: &&SmallMotion| motion.exponent.re > SURELY * motion.uncertainty * motion.exponent.norm();
-    let fastest = growing.iter().filter(surely).max_by(|a, b| a.exponent.re.total_cmp(&b.exponent.re));
+    let fastest = growth.growing.iter().filter(surely).max_by(|a, b| a.exponent.re.total_cmp(&b.exponent.re));
     match fastest {
         Some(motion) => Vibrations::Growing(Mode { omega: motion.exponent.im, growth: motion.exponent.re }),
-        None if growing.is_empty() => Vibrations::Bounded,
+        None if growth.growing.is_empty() && growth.is_sure => Vibrations::Bounded,
         None => Vibrations::Unknown,
     }
 }
