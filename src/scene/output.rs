@@ -118,7 +118,7 @@ impl Columns<'_> {
         let beam = &self.mesh.beams[inside.beam].name;
         let section = self.stresses.at(beam, inside.fraction, &name.span)?;
         let plain = group("stress").ok_or_else(|| no_column(name))?;
-        let group = if section.has_strength() { &STRESS_WITH_INDEX } else { plain };
+        let group = if section.section().has_strength() { &STRESS_WITH_INDEX } else { plain };
         let Source::Stress(read) = group.source else { return Err(no_column(name)) };
         let names = group.names_at(&name.value);
         Ok(Probe { names, group, reading: Reading::Stress(StressPlace { inside, section }, read) })

@@ -1,15 +1,15 @@
 //! Stresses of the sections of a deck at places on its beams.
 
 use super::computed::{self, Solution, SolvedSection};
-use super::names;
 use super::section::{blend_shapes, find_material};
+use super::{names, path};
 use crate::deck::{
     self, Beam, ComputedSection, ComputedShape, CornerWord, Deck, Diagnostic, Elastic, SectionBody, Shape, Span,
     Strength,
 };
 use beamsim_core::section::closed::{ClosedForm, ClosedShape};
 use beamsim_core::section::material::Material;
-use beamsim_core::section::recovery::{Placement, PointStress, Recovery};
+use beamsim_core::section::recovery::{PlacedRecovery, Placement, PointStress, Recovery};
 use beamsim_core::section::strength::{FailureLaw, Strengths};
 use beamsim_core::section::stress::Corners;
 use std::cell::RefCell;
@@ -40,11 +40,13 @@ impl<'d> SectionStresses<'d> {
     }
 
     /// The section at a fraction of the length of a beam; errors are about `span`.
-    pub fn at(&self, beam: &str, fraction: f64, span: &Span) -> Result<Arc<Recovery>, Diagnostic> {
-        match self.find(beam, fraction, span)? {
-            Found::Named(section) => self.of_section(section, span),
-            Found::Between(ends, along) => self.between(ends, along, (beam, fraction), span),
-        }
+    pub fn at(&self, beam: &str, fraction: f64, span: &Span) -> Result<PlacedRecovery, Diagnostic> {
+        let known = self.beam(beam, span)?;
+        let section = match self.find(known, fraction)? {
+            Found::Named(section) => self.of_section(section, span)?,
+            Found::Between(ends, along) => self.between(ends, along, (beam, fraction), span)?,
+        };
+        Ok(placed(section, known, fraction))
     }
 
     /// Stresses at a fixed point of the section at a fraction of the length of a beam.
@@ -55,7 +57,8 @@ impl<'d> SectionStresses<'d> {
         point: &deck::SectionProbe,
         span: &Span,
     ) -> Result<PointStress, Diagnostic> {
-        let Found::Named(section) = self.find(beam, fraction, span)? else {
+        let known = self.beam(beam, span)?;
+        let Found::Named(section) = self.find(known, fraction)? else {
             let message = format!(
                 "the section of beam `{beam}` varies there, so that it has no point `{}`: ask for it where the \
                  section is one of the deck",
@@ -63,7 +66,7 @@ impl<'d> SectionStresses<'d> {
             );
             return Err(Diagnostic::error(message, span.clone()));
         };
-        let stresses = self.of_section(section, span)?;
+        let stresses = placed(self.of_section(section, span)?, known, fraction);
         let solved = solved(section, self.deck, span)?;
         let found = match &solved.solution {
             None => stresses.at(point.at, None),
@@ -88,7 +91,7 @@ impl<'d> SectionStresses<'d> {
 
     /// The points of the section at a place, if it is one of the deck.
     pub fn points(&self, beam: &str, fraction: f64) -> &'d [deck::SectionProbe] {
-        match self.find(beam, fraction, &(0..0)) {
+        match self.beam(beam, &(0..0)).and_then(|known| self.find(known, fraction)) {
             Ok(Found::Named(section)) => &section.probes,
             Ok(Found::Between(..)) | Err(_) => &[],
         }
@@ -96,13 +99,15 @@ impl<'d> SectionStresses<'d> {
 
     /// Fractions of the length at which a beam has a section of the deck by its stations.
     pub fn stations(&self, beam: &str) -> Vec<f64> {
-        let found = self.deck.beams.iter().find(|known| known.name.value == beam);
-        found.map_or(Vec::new(), stations)
+        self.beam(beam, &(0..0)).map_or(Vec::new(), stations)
     }
 
-    fn find(&self, beam: &str, fraction: f64, span: &Span) -> Result<Found<'d>, Diagnostic> {
-        let known = self.deck.beams.iter().find(|known| known.name.value == beam);
-        let known = known.ok_or_else(|| Diagnostic::error(format!("there is no beam `{beam}`"), span.clone()))?;
+    fn beam(&self, name: &str, span: &Span) -> Result<&'d Beam, Diagnostic> {
+        let known = self.deck.beams.iter().find(|known| known.name.value == name);
+        known.ok_or_else(|| Diagnostic::error(format!("there is no beam `{name}`"), span.clone()))
+    }
+
+    fn find(&self, known: &'d Beam, fraction: f64) -> Result<Found<'d>, Diagnostic> {
         let section = |k: usize| {
             let name = &known.sections[k];
             let found = self.deck.sections.iter().find(|section| section.name.value == name.value);
@@ -167,6 +172,14 @@ impl<'d> SectionStresses<'d> {
         let help = format!("ask for it where the section is one of the deck: {}", stations.join(", "));
         Err(Diagnostic::error(message, span.clone()).help(help))
     }
+}
+
+/// A section where a beam has it at a fraction of its length: beside its line and turned, by `offset`
+/// and `turn` of the beam.
+fn placed(section: Arc<Recovery>, beam: &Beam, fraction: f64) -> PlacedRecovery {
+    let offset = path::along(beam, beam.offset.as_ref()).at(fraction);
+    let [turn] = path::along(beam, beam.turn.as_ref()).at(fraction);
+    PlacedRecovery::new(section, offset, turn)
 }
 
 /// Places of the sections of a beam as fractions of its length.

@@ -12,7 +12,7 @@ use super::search::{Hit, PointTree, Spread};
 use super::strength::FailureLaw;
 use super::stress::{Corners, NodalStresses, Peak, extreme_principal_stresses, von_mises};
 use super::{Matrix6, Point, Vector6};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// The part of a value by which a sample of a closed form may be below the largest one between
 /// samples
@@ -81,6 +81,13 @@ pub struct Placement {
 }
 
 impl Placement {
+    /// Of a section whose origin lies at `offset` from the line of the beam, along axes 2 and 3 of the
+    /// beam, and whose axes are turned by `turn`, rad.
+    fn beside([x2, x3]: Point, turn: f64) -> Self {
+        let (sin, cos) = libm::sincos(turn);
+        Self { line: [-(cos * x2 + sin * x3), sin * x2 - cos * x3], turn, origin: [0.0; 2] }
+    }
+
     /// The load of the stress field from resultants of the beam.
     fn to_field(self) -> Matrix6 {
         let (sin, cos) = libm::sincos(self.turn);
@@ -136,6 +143,44 @@ pub struct PointStress {
     /// Stresses under unit resultants, by columns, in the order 11 22 33 23 13 12: in section axes,
     /// or in those of an oriented material
     pub unit: Matrix6,
+}
+
+/// The stresses of a section at a place of a beam: the section may lie beside the line of the beam,
+/// and be turned in its axes. Resultants are those about the line, in the axes of the beam.
+#[derive(Clone, Debug)]
+pub struct PlacedRecovery {
+    section: Arc<Recovery>,
+    /// From resultants of the beam to those about the origin of the section, in its axes
+    to_section: Matrix6,
+}
+
+impl PlacedRecovery {
+    /// With the origin of the section at `offset` from the line of the beam, along axes 2 and 3 of the
+    /// beam, and its axes turned by `turn`, rad.
+    pub fn new(section: Arc<Recovery>, offset: Point, turn: f64) -> Self {
+        Self { section, to_section: Placement::beside(offset, turn).to_field() }
+    }
+
+    /// The section, which knows nothing of its place.
+    pub fn section(&self) -> &Recovery {
+        &self.section
+    }
+
+    /// The largest value of a measure over the section, if it is above a floor.
+    pub fn largest(&self, measure: Measure, load: &Vector6, floor: f64) -> Option<Peak> {
+        self.section.largest(measure, &(self.to_section * load), floor)
+    }
+
+    /// The largest failure index over the section, if it is above a floor.
+    pub fn largest_index(&self, load: &Vector6, floor: f64) -> Option<Peak> {
+        self.section.largest_index(&(self.to_section * load), floor)
+    }
+
+    /// Stresses at a fixed point, see [`Recovery::at`].
+    pub fn at(&self, at: Point, field: Option<(&Mesh, &NodalStresses, &[bool])>) -> Option<PointStress> {
+        let PointStress { unit } = self.section.at(at, field)?;
+        Some(PointStress { unit: unit * self.to_section })
+    }
 }
 
 impl Recovery {
@@ -454,6 +499,40 @@ mod tests {
                 assert_eq!(again, Some(found));
                 assert_eq!(section.largest(Measure::VonMises, &load, found.value), None);
             }
+        }
+    }
+
+    #[test]
+    fn a_section_beside_the_line_sees_moments_about_its_origin() {
+        let form = ClosedForm { shape: ClosedShape::Rectangle { half: [1.0, 2.0] }, nu: 0.3 };
+        let section = Arc::new(Recovery::closed("s", form, Placement::default(), None));
+        // Tension along the line bends a section that lies above it, and pulls most at its lower side.
+        let pulled = Vector6::ith(0, 1.0);
+        let above = PlacedRecovery::new(section.clone(), [0.0, 3.0], 0.0);
+        let found = above.largest(Measure::Axial, &pulled, 0.0).expect("a value");
+        assert!((found.value - (1.0 / 8.0 + 3.0 * 2.0 / (32.0 / 3.0))).abs() < 1e-12, "{found:?}");
+        assert!((found.at[1] + 2.0).abs() < 1e-12, "{found:?}");
+        // Turned by a right angle, its axis 2 points to 3 of the beam: the side at -1 is the lower one.
+        let turned = PlacedRecovery::new(section, [0.0, 3.0], 0.5 * PI);
+        let found = turned.largest(Measure::Axial, &pulled, 0.0).expect("a value");
+        assert!((found.value - (1.0 / 8.0 + 3.0 / (8.0 / 3.0))).abs() < 1e-12, "{found:?}");
+        let lower = turned.at([-1.0, 0.0], None).expect("a point");
+        assert!((lower.unit[(0, 0)] - found.value).abs() < 1e-12, "{lower:?}");
+    }
+
+    #[test]
+    fn offset_and_turn_of_a_beam_are_those_of_a_section() {
+        let form = ClosedForm { shape: ClosedShape::Rectangle { half: [1.0, 2.0] }, nu: 0.3 };
+        let turn = 0.4;
+        let own = Arc::new(Recovery::closed("s", form, Placement::default(), None));
+        let placement = Placement::beside([0.7, -0.2], turn);
+        let other = Recovery::closed("s", form, placement, None);
+        let placed = PlacedRecovery::new(own, [0.7, -0.2], turn);
+        for k in 0..6 {
+            let load = Vector6::from_fn(|i, _| if i == k { 1.0 } else { 0.1 });
+            let [a, b] = [placed.largest(Measure::VonMises, &load, 0.0), other.largest(Measure::VonMises, &load, 0.0)];
+            let [a, b] = [a, b].map(|peak| peak.expect("a value").value);
+            assert!((a - b).abs() < 1e-12 * b, "{k}: {a} {b}");
         }
     }
 
