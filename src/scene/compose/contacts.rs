@@ -138,20 +138,8 @@ impl Composer<'_> {
         let parties = self.parties(contact, number);
         let with: Vec<Strand> = contact.with.iter().filter_map(|name| self.beam_named(contact, name, number)).collect();
         let radius = parties.iter().chain(&with).map(|party| party.radius).fold(f64::INFINITY, f64::min);
-        let penetration = contact.penetration.unwrap_or(PENETRATION * radius);
-        out.laws.push(ContactLaws {
-            name: contact.name.value.clone(),
-            friction: contact.friction,
-            stick: contact.stick,
-            penetration: if penetration.is_finite() { penetration } else { 1.0 },
-            damping: match contact.damping {
-                ContactDamping::Factor(damping) => damping,
-                ContactDamping::Restitution { restitution, speed } => {
-                    damping_of(restitution, speed).unwrap_or_default()
-                }
-            },
-            amplitude: self.switch(contact.stages.as_ref()),
-        });
+        let laws = self.laws_of(contact, radius);
+        out.laws.push(laws);
         for name in &contact.surfaces {
             let Some(surface) = self.deck.surfaces.iter().position(|surface| surface.name.value == name.value) else {
                 let known = self.deck.surfaces.iter().map(|surface| surface.name.value.as_str());
@@ -169,6 +157,24 @@ impl Composer<'_> {
             }
         }
         self.add_meetings(contact, parties, with, pairs);
+    }
+
+    /// The laws of a contact whose thinnest party has this radius.
+    fn laws_of(&mut self, contact: &deck::Contact, radius: f64) -> ContactLaws {
+        let penetration = contact.penetration.unwrap_or(PENETRATION * radius);
+        ContactLaws {
+            name: contact.name.value.clone(),
+            friction: contact.friction,
+            stick: contact.stick,
+            penetration: if penetration.is_finite() { penetration } else { 1.0 },
+            damping: match contact.damping {
+                ContactDamping::Factor(damping) => damping,
+                ContactDamping::Restitution { restitution, speed } => {
+                    damping_of(restitution, speed).unwrap_or_default()
+                }
+            },
+            amplitude: self.switch(contact.stages.as_ref()),
+        }
     }
 
     /// Adds the meetings of a contact: beams with other beams, and with themselves.
