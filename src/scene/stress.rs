@@ -246,12 +246,12 @@ fn closed(section: &deck::Section, deck: &Deck) -> Result<(ClosedForm, Option<Fa
     };
     match &section.body {
         SectionBody::Shaped { shape, material, .. } => of_body(shape, material),
-        SectionBody::Computed(body) => match &**body {
-            ComputedSection { shape: ComputedShape::Solid(shape), material: Some(material), .. } => {
-                of_body(shape, material)
-            }
-            _ => Err(Diagnostic::error("a section without a closed form", section.name.span.clone())),
-        },
+        SectionBody::Computed(body) => {
+            let ComputedSection { shape: ComputedShape::Solid(shape), material: Some(material), .. } = &**body else {
+                return Err(Diagnostic::error("a section without a closed form", section.name.span.clone()));
+            };
+            of_body(shape, material)
+        }
         SectionBody::Resultants { .. } | SectionBody::Full { .. } => {
             Err(Diagnostic::error("a section without a shape", section.name.span.clone()))
         }
