@@ -7,6 +7,7 @@ use crate::deck::{
 };
 use crate::scene::mesh::MeshBeam;
 use crate::scene::names::{self, unknown};
+use crate::scene::path;
 use crate::scene::surfaces;
 use beamsim_core::effect::contact::{
     BeamPairs, Chain, ChainNode, ContactLaws, ContactStiffness, Meeting, SceneSurface, Strand, SurfaceCarrier,
@@ -255,7 +256,8 @@ impl Composer<'_> {
         };
         if found.is_none() {
             let message = format!("the contact needs a `radius` for `{}`", name.value);
-            let help = "only beams with one section of shape = \"circle\" or \"tube\" have a radius of their own";
+            let help = "only beams with one section of shape = \"circle\" or \"tube\" about its line have a radius of \
+                        their own";
             self.report(Diagnostic::error(message, contact.span.clone()).help(help));
         }
         found
@@ -343,9 +345,12 @@ fn shortest_step(deck: &Deck) -> Option<f64> {
     steps.min_by(f64::total_cmp)
 }
 
-/// The radius of a beam whose sections are equal circles or tubes.
+/// The radius of a beam whose sections are equal circles or tubes about its line.
 fn radius_of_sections(deck: &Deck, beam: &str) -> Option<f64> {
     let beam = deck.beams.iter().find(|known| known.name.value == beam)?;
+    if !path::along(beam, beam.offset.as_ref()).is_zero() {
+        return None;
+    }
     let radius = |name: &Spanned<String>| {
         let section = deck.sections.iter().find(|section| section.name.value == name.value)?;
         match section.body {
