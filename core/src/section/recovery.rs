@@ -194,8 +194,9 @@ impl Recovery {
         let point = |[i, j]: [usize; 2]| form.point([along(i, columns, [u0, u1]), along(j, rows, [v0, v1])]);
         let at: Vec<Point> = grid.map(point).collect();
         let units = at.iter().map(|&at| form.unit(at)).collect();
+        let count = at.len() as u32;
         let points = at.into_iter().map(|at| (at, 0)).collect();
-        let laws = vec![(law, Vec::new())];
+        let laws = vec![(law, (0..count).map(|number| (number, [0.0; 2])).collect())];
         Self::new(name, vec![name.to_string()], placement, points, units, laws).with_closed(form)
     }
 
@@ -231,7 +232,7 @@ impl Recovery {
     }
 
     /// From points with unit stresses of the field, and for each material its law with the points
-    /// that have it and their angles beta and theta; none for all points.
+    /// that have it and their angles beta and theta.
     fn new(
         name: &str,
         regions: Vec<String>,
@@ -247,8 +248,6 @@ impl Recovery {
         let tree = PointTree::new(&at, &kind, &units);
         let failures = laws.into_iter().filter_map(|(law, members)| {
             let law = law?;
-            let all = || (0..at.len() as u32).map(|number| (number, [0.0; 2])).collect();
-            let members: Vec<(u32, [f64; 2])> = if members.is_empty() && regions.len() == 1 { all() } else { members };
             let of = |values: &[usize]| members.iter().map(|&(k, _)| values[k as usize]).collect::<Vec<_>>();
             let own_at: Vec<Point> = members.iter().map(|&(k, _)| at[k as usize]).collect();
             let own: Vec<Matrix6> =
