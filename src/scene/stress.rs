@@ -184,11 +184,8 @@ fn placed(section: Arc<Recovery>, beam: &Beam, fraction: f64) -> PlacedRecovery 
 
 /// Places of the sections of a beam as fractions of its length.
 fn stations(beam: &Beam) -> Vec<f64> {
-    match (&beam.stations, beam.sections.len()) {
-        (Some(stations), _) => {
-            let last = stations.value.last().copied().unwrap_or(1.0);
-            stations.value.iter().map(|station| station / last).collect()
-        }
+    match (path::stations(beam), beam.sections.len()) {
+        (Some(stations), _) => stations,
         (None, 2) => vec![0.0, 1.0],
         (None, _) => vec![0.0],
     }
