@@ -143,7 +143,7 @@ impl Columns<'_> {
 
     /// Adds the stresses at all points of the section at a node.
     fn add_stress_points(&self, node: &Spanned<String>, probes: &mut Vec<Probe>, diagnostics: &mut Vec<Diagnostic>) {
-        // What is wrong with the place has been told with the largest stresses.
+        // The probe of the largest stresses reports errors of the place.
         let Some(inside) = self.mesh.find(self.deck, node).ok().and_then(|at| self.beam_point(node, &at).ok()) else {
             return;
         };

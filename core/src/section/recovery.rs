@@ -531,7 +531,7 @@ mod tests {
             let load = Vector6::from_fn(|i, _| if i == k { 1.0 } else { 0.1 });
             let [a, b] = [placed.largest(Measure::VonMises, &load, 0.0), other.largest(Measure::VonMises, &load, 0.0)];
             let [a, b] = [a, b].map(|peak| peak.expect("a value").value);
-            assert!((a - b).abs() < 1e-12 * b, "{k}: {a} {b}");
+            assert!((a - b).abs() < 1e-6 * b, "{k}: {a} {b}");
         }
     }
 
