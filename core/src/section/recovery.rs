@@ -1,8 +1,9 @@
 //! The stresses of a section under the resultants of a beam: the largest over the section of several
 //! measures, and those at fixed points. From closed forms, or from a computed section.
 //!
-//! Resultants N1 N2 N3 M1 M2 M3 are those about the line of the beam, in the axes of the beam.
-//! Places, and stresses at fixed points, are in the coordinates of the shape.
+//! Resultants N1 N2 N3 M1 M2 M3 of a [`Recovery`] are those about the reference point of the section,
+//! in its axes; those of a [`PlacedRecovery`] are about the line of the beam, in the axes of the
+//! beam. Places, and stresses at fixed points, are in the coordinates of the shape.
 
 use super::closed::ClosedForm;
 use super::material::{material_axes, stress_in_material_axes};
@@ -161,7 +162,7 @@ impl PlacedRecovery {
         Self { section, to_section: Placement::beside(offset, turn).to_field() }
     }
 
-    /// The section, which knows nothing of its place.
+    /// The section, without its place on the beam.
     pub fn section(&self) -> &Recovery {
         &self.section
     }
