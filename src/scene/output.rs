@@ -158,7 +158,8 @@ impl Columns<'_> {
     /// Probe and component of a column of stresses, by its name.
     fn find_stress(&self, name: &Spanned<String>) -> Result<(Probe, usize), Diagnostic> {
         let (owner, suffix) = name.value.rsplit_once('.').ok_or_else(|| no_column(name))?;
-        let is_point = |point: &str| self.deck.sections.iter().flat_map(|s| &s.probes).any(|p| p.name.value == point);
+        // Names of points begin with a letter, parts of a number do not: `arm@0.5`.
+        let is_point = |name: &str| name.starts_with(char::is_alphabetic);
         let at = |place: &str| Spanned { value: place.to_string(), span: name.span.clone() };
         let probe = match owner.rsplit_once('.') {
             Some((place, point)) if is_point(point) => self.point_probe(&at(place), point)?,
@@ -170,7 +171,10 @@ impl Columns<'_> {
                 let message = format!("`{}` needs a `strength` or `strain_limit` of a material", name.value);
                 Err(Diagnostic::error(message, name.span.clone()))
             }
-            None => Err(no_column(name).help("give the name of a point of the section: `arm@0.5.top.s11`")),
+            None => {
+                let message = format!("`{}` needs the name of a point of the section", name.value);
+                Err(Diagnostic::error(message, name.span.clone()).help("such as `arm@0.5.top.s11`"))
+            }
         }
     }
 
