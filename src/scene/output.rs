@@ -128,13 +128,7 @@ impl Columns<'_> {
     fn point_probe(&self, name: &Spanned<String>, point: &str) -> Result<Probe, Diagnostic> {
         let inside = self.beam_point(name, &self.mesh.find(self.deck, name)?)?;
         let beam = &self.mesh.beams[inside.beam].name;
-        let points = self.stresses.points(beam, inside.fraction);
-        let Some(known) = points.iter().find(|known| known.name.value == point) else {
-            let message = format!("the section at `{}` has no point `{point}`", name.value);
-            let help = "name it in [section.NAME]: probe = { NAME = [x2, x3] }";
-            return Err(Diagnostic::error(message, name.span.clone()).help(help));
-        };
-        let stress = self.stresses.at_point(beam, inside.fraction, known, &name.span)?;
+        let stress = self.stresses.at_point(beam, inside.fraction, point, name)?;
         let Source::StressPoint(read) = STRESS_AT_POINT.source else { return Err(no_column(name)) };
         let names = STRESS_AT_POINT.names_at(&format!("{}.{point}", name.value));
         let reading = Reading::StressPoint(StressPoint { inside, stress }, read);

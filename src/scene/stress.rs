@@ -5,10 +5,11 @@ use super::section::{blend_shapes, find_material};
 use super::{names, path};
 use crate::deck::{
     self, Beam, ComputedSection, ComputedShape, CornerWord, Deck, Diagnostic, Elastic, SectionBody, Shape, Span,
-    Strength,
+    Spanned, Strength,
 };
 use beamsim_core::section::closed::{ClosedForm, ClosedShape};
 use beamsim_core::section::material::Material;
+use beamsim_core::section::mesh::Region;
 use beamsim_core::section::recovery::{PlacedRecovery, Placement, PointStress, Recovery};
 use beamsim_core::section::strength::{FailureLaw, Strengths};
 use beamsim_core::section::stress::Corners;
@@ -49,44 +50,31 @@ impl<'d> SectionStresses<'d> {
         Ok(placed(section, known, fraction))
     }
 
-    /// Stresses at a fixed point of the section at a fraction of the length of a beam.
+    /// Stresses at a fixed point of the section at a fraction of the length of a beam, the place
+    /// `name`.
     pub fn at_point(
         &self,
         beam: &str,
         fraction: f64,
-        point: &deck::SectionProbe,
-        span: &Span,
+        point: &str,
+        name: &Spanned<String>,
     ) -> Result<PointStress, Diagnostic> {
+        let span = &name.span;
         let known = self.beam(beam, span)?;
         let Found::Named(section) = self.find(known, fraction)? else {
             let message = format!(
-                "the section of beam `{beam}` varies there, so that it has no point `{}`: ask for it where the \
-                 section is one of the deck",
-                point.name.value
+                "the section of beam `{beam}` varies there, so that it has no point `{point}`: ask for it where the \
+                 section is one of the deck"
             );
             return Err(Diagnostic::error(message, span.clone()));
         };
-        let stresses = placed(self.of_section(section, span)?, known, fraction);
-        let solved = solved(section, self.deck, span)?;
-        let found = match &solved.solution {
-            None => stresses.at(point.at, None),
-            Some(Solution { analysis, materials, .. }) => {
-                let field = analysis.stresses(materials).map_err(|error| broken(section, &error, span))?;
-                let is_oriented =
-                    |region: &beamsim_core::section::mesh::Region| !materials[region.material].is_isotropic();
-                let is_oriented: Vec<bool> = analysis.mesh.regions.iter().map(is_oriented).collect();
-                stresses.at(point.at, Some((&analysis.mesh, field, &is_oriented)))
-            }
+        let Some(point) = section.probes.iter().find(|known| known.name.value == point) else {
+            let message = format!("the section at `{}` has no point `{point}`", name.value);
+            let help = "name it in [section.NAME]: probe = { NAME = [x2, x3] }";
+            return Err(Diagnostic::error(message, span.clone()).help(help));
         };
-        found.ok_or_else(|| {
-            let [x2, x3] = point.at;
-            let message = format!(
-                "the point `{}` at [{x2}, {x3}] lies outside section `{}`",
-                point.name.value, section.name.value
-            );
-            let help = "`probe` takes coordinates of the shape, as `beamsim section` shows them";
-            Diagnostic::error(message, point.name.span.clone()).help(help)
-        })
+        let stresses = placed(self.of_section(section, span)?, known, fraction);
+        stress_at_point(&stresses, section, point, self.deck, span)
     }
 
     /// The points of the section at a place, if it is one of the deck.
@@ -172,6 +160,33 @@ impl<'d> SectionStresses<'d> {
         let help = format!("ask for it where the section is one of the deck: {}", stations.join(", "));
         Err(Diagnostic::error(message, span.clone()).help(help))
     }
+}
+
+/// Stresses at a point of a section of the deck.
+fn stress_at_point(
+    stresses: &PlacedRecovery,
+    section: &deck::Section,
+    point: &deck::SectionProbe,
+    deck: &Deck,
+    span: &Span,
+) -> Result<PointStress, Diagnostic> {
+    let solved = solved(section, deck, span)?;
+    let found = match &solved.solution {
+        None => stresses.at(point.at, None),
+        Some(Solution { analysis, materials, .. }) => {
+            let field = analysis.stresses(materials).map_err(|error| broken(section, &error, span))?;
+            let is_oriented = |region: &Region| !materials[region.material].is_isotropic();
+            let is_oriented: Vec<bool> = analysis.mesh.regions.iter().map(is_oriented).collect();
+            stresses.at(point.at, Some((&analysis.mesh, field, &is_oriented)))
+        }
+    };
+    found.ok_or_else(|| {
+        let [x2, x3] = point.at;
+        let message =
+            format!("the point `{}` at [{x2}, {x3}] lies outside section `{}`", point.name.value, section.name.value);
+        let help = "`probe` takes coordinates of the shape, as `beamsim section` shows them";
+        Diagnostic::error(message, point.name.span.clone()).help(help)
+    })
 }
 
 /// A section where a beam has it at a fraction of its length: beside its line and turned, by `offset`
