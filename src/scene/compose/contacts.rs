@@ -256,7 +256,7 @@ impl Composer<'_> {
         };
         if found.is_none() {
             let message = format!("the contact needs a `radius` for `{}`", name.value);
-            let help = "only beams with one section of shape = \"circle\" or \"tube\" about its line have a radius of \
+            let help = "only beams with one section of shape = \"circle\" or \"tube\" about their line have a radius of \
                         their own";
             self.report(Diagnostic::error(message, contact.span.clone()).help(help));
         }
