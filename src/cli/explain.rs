@@ -4,7 +4,9 @@ use super::console;
 use super::status::Status;
 use crate::deck::{self, Entry, Hint};
 use crate::output::Units;
-use beamsim_core::probe::{COLUMNS, ColumnGroup, ColumnPart, Source, find_part};
+use beamsim_core::probe::{
+    COLUMNS, ColumnGroup, ColumnPart, ENERGY_WITH_CONTACTS, STRESS_AT_POINT, STRESS_WITH_INDEX, Source, find_part,
+};
 
 /// Line width of explanations, in columns of the terminal.
 const WIDTH: usize = 96;
@@ -52,12 +54,16 @@ fn describe(entry: &Entry) -> String {
 
 /// Descriptions of the columns of a group (`u`), or of one column (`uz`, `omega`).
 fn describe_columns(name: &str) -> Vec<String> {
-    let mut texts = Vec::new();
-    for group in &COLUMNS {
+    let of_group = |group: &'static ColumnGroup| {
         let is_whole = group.key == name;
-        for part in group.parts.iter().filter(|part| is_whole || part.suffixes.contains(&name)) {
-            texts.push(describe_part(group, part));
-        }
+        let parts = group.parts.iter().filter(move |part| is_whole || part.suffixes.contains(&name));
+        parts.map(|part| describe_part(group, part)).collect::<Vec<_>>()
+    };
+    let mut texts: Vec<String> = COLUMNS.iter().flat_map(of_group).collect();
+    if texts.is_empty() {
+        // Columns that a group has in some scenes alone.
+        let others = [&ENERGY_WITH_CONTACTS, &STRESS_WITH_INDEX, &STRESS_AT_POINT];
+        texts.extend(others.into_iter().flat_map(of_group));
     }
     // Columns of modes and critical loads belong to no group.
     match find_part(name) {
@@ -78,7 +84,12 @@ fn describe_part(group: &ColumnGroup, part: &ColumnPart) -> String {
         Source::Scene(_) => "the whole scene",
         Source::Run(_) => "the run",
     };
-    let before = if group.is_of_node() { "tip" } else { group.key };
+    let before = match group.source {
+        Source::StressPoint(_) => "arm@0.5.top",
+        Source::Stress(_) => "arm@0.5",
+        Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) => "tip",
+        Source::Contact(_) | Source::Scene(_) | Source::Run(_) => group.key,
+    };
     let names: Vec<String> = part.suffixes.iter().map(|suffix| format!("{before}.{suffix}")).collect();
     let names = if names.is_empty() { group.key.to_string() } else { names.join(", ") };
     let how = match group.source {

@@ -65,6 +65,9 @@ fn all(wanted: &SectionArguments) -> Result<(), CommandError> {
         report.print();
         let stresses = solved.as_ref().map(|_| scene::section_stresses(section, deck, &section.name.span));
         let stresses = stresses.transpose().map_err(|found| read.refuse(path, &[found]))?;
+        if stresses.is_none() && !wanted.load.is_empty() {
+            console::line("  no stress: the section is given by numbers, not by a shape");
+        }
         let shown =
             stresses.as_ref().map_or(Vec::new(), |stresses| section_stress::show(stresses, &loads, &units, digits));
         let picture = picture_name(&section.name.value, deck);

@@ -31,8 +31,10 @@ pub fn loads(given: &[f64]) -> Result<Loads, CommandError> {
         let unit = |k: usize| (RESULTANTS[k].to_string(), Vector6::ith(k, 1.0));
         return Ok(Loads { all: (0..6).map(unit).collect(), is_given: false });
     }
-    let is_complete = given.len() == 6 && given.iter().all(|number| number.is_finite());
-    if !is_complete {
+    if let Some(number) = given.iter().find(|number| !number.is_finite()) {
+        return Err(CommandError::Usage(format!("--load needs finite numbers, found {number}")));
+    }
+    if given.len() != 6 {
         let count = given.len();
         return Err(CommandError::Usage(format!(
             "--load needs the six resultants N1,N2,N3,M1,M2,M3, found {count}: --load 0,0,100,0,50,0"

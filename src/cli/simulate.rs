@@ -92,7 +92,8 @@ pub fn simulate(
         }
         Err(error) => (None, None, Err(Failure::Io(error.to_string()))),
     };
-    // A film, fields, stresses along beams and checkpoints need the whole state of each row, which an outcome does not have.
+    // A film, fields, stresses along beams and checkpoints need the whole state of each row, which
+    // an outcome does not have.
     let needs_states = film.is_some() || from.is_some() || results.as_ref().is_some_and(Results::need_states);
     let outcome = outcome.filter(|_| !needs_states);
     let mut watcher = Watcher {

@@ -122,7 +122,10 @@ fn read_probes(table: &Table) -> Option<Vec<SectionProbe>> {
         let at = table.context.vector(item)?.value;
         let is_plain = name.value.chars().all(|c| c.is_alphanumeric() || c == '_');
         if !is_plain || !name.value.starts_with(char::is_alphabetic) {
-            let message = format!("a point of a section has a name of letters and digits, found `{}`", name.value);
+            let message = format!(
+                "a point of a section has a name of letters and digits that begins with a letter, found `{}`",
+                name.value
+            );
             return table.context.wrong(name.span, message);
         }
         Some(SectionProbe { name, at })

@@ -562,7 +562,7 @@ fn stress_records(envelope: &Envelope, mesh: &Mesh) -> Vec<StressRecord> {
     let mut records: Vec<StressRecord> = Vec::new();
     for (place, found) in envelope.places().iter().zip(envelope.found()) {
         let beam = &mesh.beams[place.inside.beam].name;
-        let section = &place.section.name;
+        let section = &place.section.section().name;
         let number = records.iter().position(|known| known.beam == *beam && known.section == *section);
         let number = number.unwrap_or_else(|| {
             records.push(StressRecord { beam: beam.clone(), section: section.clone(), ..StressRecord::default() });
@@ -587,7 +587,7 @@ fn extreme_record(found: &Extreme, place: &StressPlace) -> ExtremeRecord {
         load: Number(found.moment.load),
         fraction: place.inside.fraction,
         point: found.at,
-        region: place.section.regions.get(found.region).cloned().unwrap_or_default(),
+        region: place.section.section().regions.get(found.region).cloned().unwrap_or_default(),
         resultant: found.resultant.map(Number),
     }
 }

@@ -7,7 +7,7 @@ use super::{OutputError, ResultFolder};
 use crate::scene::Mesh;
 use beamsim_core::probe::{BeamPoint, Envelope, Extreme, Extremes, Profile, ProfilePlace, StageEnd, StressPlace};
 use beamsim_core::section::Vector6;
-use beamsim_core::section::recovery::{Measure, Recovery};
+use beamsim_core::section::recovery::{Measure, PlacedRecovery, Recovery};
 
 /// Columns of a place.
 const PLACE: [&str; 3] = ["beam", "fraction", "length"];
@@ -29,10 +29,10 @@ pub fn write_envelope(folder: &ResultFolder, mesh: &Mesh, envelope: &Envelope) -
     }
     let row = |(place, found): (&StressPlace, &Extremes)| {
         let mut cells = place_cells(mesh, &place.inside);
-        cells.push(harmless(&place.section.name).into_owned());
-        cells.extend(extreme_cells(&place.section, found.von_mises.as_ref()));
+        cells.push(harmless(&place.section.section().name).into_owned());
+        cells.extend(extreme_cells(place.section.section(), found.von_mises.as_ref()));
         if has_index {
-            cells.extend(extreme_cells(&place.section, found.index.as_ref()));
+            cells.extend(extreme_cells(place.section.section(), found.index.as_ref()));
         }
         cells
     };
@@ -44,7 +44,7 @@ pub fn write_envelope(folder: &ResultFolder, mesh: &Mesh, envelope: &Envelope) -
 pub fn write_profile(folder: &ResultFolder, mesh: &Mesh, profile: &Profile) -> Result<(), OutputError> {
     let known = || profile.places().iter().filter_map(|place| place.section.as_ref());
     let has_stress = known().next().is_some();
-    let has_index = known().any(|section| section.has_strength());
+    let has_index = known().any(|section| section.section().has_strength());
     let stress = has_stress.then_some("vm").into_iter().chain(has_index.then_some("index"));
     let clocks = ["stage", "time", "load"];
     let header: Vec<&str> = clocks.into_iter().chain(PLACE).chain(RESULTANTS).chain(stress).collect();
@@ -55,7 +55,7 @@ pub fn write_profile(folder: &ResultFolder, mesh: &Mesh, profile: &Profile) -> R
         cells.extend(resultants.iter().copied().map(number));
         let load = Vector6::from(*resultants);
         let lowest = f64::NEG_INFINITY;
-        let of_section = |find: &dyn Fn(&Recovery) -> Option<f64>| {
+        let of_section = |find: &dyn Fn(&PlacedRecovery) -> Option<f64>| {
             place.section.as_ref().and_then(|section| find(section)).map_or(String::new(), number)
         };
         if has_stress {

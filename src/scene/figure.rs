@@ -5,13 +5,13 @@ use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::Link;
 use beamsim_core::probe::{BeamPoint, Figure, Line, LinePoint, Place};
-use beamsim_core::section::recovery::Recovery;
+use beamsim_core::section::recovery::PlacedRecovery;
 use beamsim_core::tensor::Mat3;
 use nalgebra::Matrix6;
 use std::sync::Arc;
 
 /// Stresses of the sections at the nodes of each beam, where they are known
-pub type SectionsAtNodes = Vec<Vec<Option<Arc<Recovery>>>>;
+pub type SectionsAtNodes = Vec<Vec<Option<PlacedRecovery>>>;
 
 /// Every node of every beam, the rigid bodies, and the ends of what joins two nodes. `sections` may be
 /// empty.
@@ -42,7 +42,7 @@ fn point(
     number: usize,
     k: usize,
     elasticity: &[Arc<dyn StressField>],
-    section: Option<Arc<Recovery>>,
+    section: Option<PlacedRecovery>,
 ) -> LinePoint {
     let beam = &mesh.beams[number];
     let node = &mesh.nodes[beam.nodes[k]];

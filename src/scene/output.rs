@@ -118,7 +118,7 @@ impl Columns<'_> {
         let beam = &self.mesh.beams[inside.beam].name;
         let section = self.stresses.at(beam, inside.fraction, &name.span)?;
         let plain = group("stress").ok_or_else(|| no_column(name))?;
-        let group = if section.has_strength() { &STRESS_WITH_INDEX } else { plain };
+        let group = if section.section().has_strength() { &STRESS_WITH_INDEX } else { plain };
         let Source::Stress(read) = group.source else { return Err(no_column(name)) };
         let names = group.names_at(&name.value);
         Ok(Probe { names, group, reading: Reading::Stress(StressPlace { inside, section }, read) })
@@ -128,13 +128,7 @@ impl Columns<'_> {
     fn point_probe(&self, name: &Spanned<String>, point: &str) -> Result<Probe, Diagnostic> {
         let inside = self.beam_point(name, &self.mesh.find(self.deck, name)?)?;
         let beam = &self.mesh.beams[inside.beam].name;
-        let points = self.stresses.points(beam, inside.fraction);
-        let Some(known) = points.iter().find(|known| known.name.value == point) else {
-            let message = format!("the section at `{}` has no point `{point}`", name.value);
-            let help = "name it in [section.NAME]: probe = { NAME = [x2, x3] }";
-            return Err(Diagnostic::error(message, name.span.clone()).help(help));
-        };
-        let stress = self.stresses.at_point(beam, inside.fraction, known, &name.span)?;
+        let stress = self.stresses.at_point(beam, inside.fraction, point, name)?;
         let Source::StressPoint(read) = STRESS_AT_POINT.source else { return Err(no_column(name)) };
         let names = STRESS_AT_POINT.names_at(&format!("{}.{point}", name.value));
         let reading = Reading::StressPoint(StressPoint { inside, stress }, read);
@@ -143,7 +137,7 @@ impl Columns<'_> {
 
     /// Adds the stresses at all points of the section at a node.
     fn add_stress_points(&self, node: &Spanned<String>, probes: &mut Vec<Probe>, diagnostics: &mut Vec<Diagnostic>) {
-        // What is wrong with the place has been told with the largest stresses.
+        // The probe of the largest stresses reports errors of the place.
         let Some(inside) = self.mesh.find(self.deck, node).ok().and_then(|at| self.beam_point(node, &at).ok()) else {
             return;
         };
@@ -158,7 +152,8 @@ impl Columns<'_> {
     /// Probe and component of a column of stresses, by its name.
     fn find_stress(&self, name: &Spanned<String>) -> Result<(Probe, usize), Diagnostic> {
         let (owner, suffix) = name.value.rsplit_once('.').ok_or_else(|| no_column(name))?;
-        let is_point = |point: &str| self.deck.sections.iter().flat_map(|s| &s.probes).any(|p| p.name.value == point);
+        // Names of points begin with a letter, parts of a number do not: `arm@0.5`.
+        let is_point = |name: &str| name.starts_with(char::is_alphabetic);
         let at = |place: &str| Spanned { value: place.to_string(), span: name.span.clone() };
         let probe = match owner.rsplit_once('.') {
             Some((place, point)) if is_point(point) => self.point_probe(&at(place), point)?,
@@ -170,7 +165,10 @@ impl Columns<'_> {
                 let message = format!("`{}` needs a `strength` or `strain_limit` of a material", name.value);
                 Err(Diagnostic::error(message, name.span.clone()))
             }
-            None => Err(no_column(name).help("give the name of a point of the section: `arm@0.5.top.s11`")),
+            None => {
+                let message = format!("`{}` needs the name of a point of the section", name.value);
+                Err(Diagnostic::error(message, name.span.clone()).help("such as `arm@0.5.top.s11`"))
+            }
         }
     }
 

@@ -275,11 +275,14 @@ pub fn centre_line(
 /// Numbers that a beam gives at its start and its end, or at its stations; zero where it gives none.
 pub fn along<const N: usize>(beam: &deck::Beam, values: Option<&Spanned<Vec<[f64; N]>>>) -> Along<N> {
     let Some(values) = values else { return Along::zero() };
-    let stations = beam.stations.as_ref().map(|stations| {
-        let last = stations.value.last().copied().unwrap_or(1.0);
-        stations.value.iter().map(|station| station / last).collect::<Vec<f64>>()
-    });
-    Along::new(&values.value, stations.as_deref())
+    Along::new(&values.value, stations(beam).as_deref())
+}
+
+/// Places of the stations of a beam as fractions of its length, where it has stations.
+pub fn stations(beam: &deck::Beam) -> Option<Vec<f64>> {
+    let stations = &beam.stations.as_ref()?.value;
+    let last = stations.last().copied().unwrap_or(1.0);
+    Some(stations.iter().map(|station| station / last).collect())
 }
 
 fn line(

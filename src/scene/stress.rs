@@ -1,15 +1,16 @@
 //! Stresses of the sections of a deck at places on its beams.
 
 use super::computed::{self, Solution, SolvedSection};
-use super::names;
 use super::section::{blend_shapes, find_material};
+use super::{names, path};
 use crate::deck::{
     self, Beam, ComputedSection, ComputedShape, CornerWord, Deck, Diagnostic, Elastic, SectionBody, Shape, Span,
-    Strength,
+    Spanned, Strength,
 };
 use beamsim_core::section::closed::{ClosedForm, ClosedShape};
 use beamsim_core::section::material::Material;
-use beamsim_core::section::recovery::{Placement, PointStress, Recovery};
+use beamsim_core::section::mesh::Region;
+use beamsim_core::section::recovery::{PlacedRecovery, Placement, PointStress, Recovery};
 use beamsim_core::section::strength::{FailureLaw, Strengths};
 use beamsim_core::section::stress::Corners;
 use std::cell::RefCell;
@@ -40,55 +41,45 @@ impl<'d> SectionStresses<'d> {
     }
 
     /// The section at a fraction of the length of a beam; errors are about `span`.
-    pub fn at(&self, beam: &str, fraction: f64, span: &Span) -> Result<Arc<Recovery>, Diagnostic> {
-        match self.find(beam, fraction, span)? {
-            Found::Named(section) => self.of_section(section, span),
-            Found::Between(ends, along) => self.between(ends, along, (beam, fraction), span),
-        }
+    pub fn at(&self, beam: &str, fraction: f64, span: &Span) -> Result<PlacedRecovery, Diagnostic> {
+        let known = self.beam(beam, span)?;
+        let section = match self.find(known, fraction)? {
+            Found::Named(section) => self.of_section(section, span)?,
+            Found::Between(ends, along) => self.between(ends, along, (beam, fraction), span)?,
+        };
+        Ok(placed(section, known, fraction))
     }
 
-    /// Stresses at a fixed point of the section at a fraction of the length of a beam.
+    /// Stresses at a fixed point of the section at a fraction of the length of a beam, the place
+    /// `name`.
     pub fn at_point(
         &self,
         beam: &str,
         fraction: f64,
-        point: &deck::SectionProbe,
-        span: &Span,
+        point: &str,
+        name: &Spanned<String>,
     ) -> Result<PointStress, Diagnostic> {
-        let Found::Named(section) = self.find(beam, fraction, span)? else {
+        let span = &name.span;
+        let known = self.beam(beam, span)?;
+        let Found::Named(section) = self.find(known, fraction)? else {
             let message = format!(
-                "the section of beam `{beam}` varies there, so that it has no point `{}`: ask for it where the \
-                 section is one of the deck",
-                point.name.value
+                "the section of beam `{beam}` varies there, so that it has no point `{point}`: ask for it where the \
+                 section is one of the deck"
             );
             return Err(Diagnostic::error(message, span.clone()));
         };
-        let stresses = self.of_section(section, span)?;
-        let solved = solved(section, self.deck, span)?;
-        let found = match &solved.solution {
-            None => stresses.at(point.at, None),
-            Some(Solution { analysis, materials, .. }) => {
-                let field = analysis.stresses(materials).map_err(|error| broken(section, &error, span))?;
-                let is_oriented =
-                    |region: &beamsim_core::section::mesh::Region| !materials[region.material].is_isotropic();
-                let is_oriented: Vec<bool> = analysis.mesh.regions.iter().map(is_oriented).collect();
-                stresses.at(point.at, Some((&analysis.mesh, field, &is_oriented)))
-            }
+        let Some(point) = section.probes.iter().find(|known| known.name.value == point) else {
+            let message = format!("the section at `{}` has no point `{point}`", name.value);
+            let help = "name it in [section.NAME]: probe = { NAME = [x2, x3] }";
+            return Err(Diagnostic::error(message, span.clone()).help(help));
         };
-        found.ok_or_else(|| {
-            let [x2, x3] = point.at;
-            let message = format!(
-                "the point `{}` at [{x2}, {x3}] lies outside section `{}`",
-                point.name.value, section.name.value
-            );
-            let help = "`probe` takes coordinates of the shape, as `beamsim section` shows them";
-            Diagnostic::error(message, point.name.span.clone()).help(help)
-        })
+        let stresses = placed(self.of_section(section, span)?, known, fraction);
+        stress_at_point(&stresses, section, point, self.deck, span)
     }
 
     /// The points of the section at a place, if it is one of the deck.
     pub fn points(&self, beam: &str, fraction: f64) -> &'d [deck::SectionProbe] {
-        match self.find(beam, fraction, &(0..0)) {
+        match self.beam(beam, &(0..0)).and_then(|known| self.find(known, fraction)) {
             Ok(Found::Named(section)) => &section.probes,
             Ok(Found::Between(..)) | Err(_) => &[],
         }
@@ -96,13 +87,15 @@ impl<'d> SectionStresses<'d> {
 
     /// Fractions of the length at which a beam has a section of the deck by its stations.
     pub fn stations(&self, beam: &str) -> Vec<f64> {
-        let found = self.deck.beams.iter().find(|known| known.name.value == beam);
-        found.map_or(Vec::new(), stations)
+        self.beam(beam, &(0..0)).map_or(Vec::new(), stations)
     }
 
-    fn find(&self, beam: &str, fraction: f64, span: &Span) -> Result<Found<'d>, Diagnostic> {
-        let known = self.deck.beams.iter().find(|known| known.name.value == beam);
-        let known = known.ok_or_else(|| Diagnostic::error(format!("there is no beam `{beam}`"), span.clone()))?;
+    fn beam(&self, name: &str, span: &Span) -> Result<&'d Beam, Diagnostic> {
+        let known = self.deck.beams.iter().find(|known| known.name.value == name);
+        known.ok_or_else(|| Diagnostic::error(format!("there is no beam `{name}`"), span.clone()))
+    }
+
+    fn find(&self, known: &'d Beam, fraction: f64) -> Result<Found<'d>, Diagnostic> {
         let section = |k: usize| {
             let name = &known.sections[k];
             let found = self.deck.sections.iter().find(|section| section.name.value == name.value);
@@ -169,13 +162,45 @@ impl<'d> SectionStresses<'d> {
     }
 }
 
+/// Stresses at a point of a section of the deck.
+fn stress_at_point(
+    stresses: &PlacedRecovery,
+    section: &deck::Section,
+    point: &deck::SectionProbe,
+    deck: &Deck,
+    span: &Span,
+) -> Result<PointStress, Diagnostic> {
+    let solved = solved(section, deck, span)?;
+    let found = match &solved.solution {
+        None => stresses.at(point.at, None),
+        Some(Solution { analysis, materials, .. }) => {
+            let field = analysis.stresses(materials).map_err(|error| broken(section, &error, span))?;
+            let is_oriented = |region: &Region| !materials[region.material].is_isotropic();
+            let is_oriented: Vec<bool> = analysis.mesh.regions.iter().map(is_oriented).collect();
+            stresses.at(point.at, Some((&analysis.mesh, field, &is_oriented)))
+        }
+    };
+    found.ok_or_else(|| {
+        let [x2, x3] = point.at;
+        let message =
+            format!("the point `{}` at [{x2}, {x3}] lies outside section `{}`", point.name.value, section.name.value);
+        let help = "`probe` takes coordinates of the shape, as `beamsim section` shows them";
+        Diagnostic::error(message, point.name.span.clone()).help(help)
+    })
+}
+
+/// A section where a beam has it at a fraction of its length: beside its line and turned, by `offset`
+/// and `turn` of the beam.
+fn placed(section: Arc<Recovery>, beam: &Beam, fraction: f64) -> PlacedRecovery {
+    let offset = path::along(beam, beam.offset.as_ref()).at(fraction);
+    let [turn] = path::along(beam, beam.turn.as_ref()).at(fraction);
+    PlacedRecovery::new(section, offset, turn)
+}
+
 /// Places of the sections of a beam as fractions of its length.
 fn stations(beam: &Beam) -> Vec<f64> {
-    match (&beam.stations, beam.sections.len()) {
-        (Some(stations), _) => {
-            let last = stations.value.last().copied().unwrap_or(1.0);
-            stations.value.iter().map(|station| station / last).collect()
-        }
+    match (path::stations(beam), beam.sections.len()) {
+        (Some(stations), _) => stations,
         (None, 2) => vec![0.0, 1.0],
         (None, _) => vec![0.0],
     }
@@ -233,12 +258,12 @@ fn closed(section: &deck::Section, deck: &Deck) -> Result<(ClosedForm, Option<Fa
     };
     match &section.body {
         SectionBody::Shaped { shape, material, .. } => of_body(shape, material),
-        SectionBody::Computed(body) => match &**body {
-            ComputedSection { shape: ComputedShape::Solid(shape), material: Some(material), .. } => {
-                of_body(shape, material)
-            }
-            _ => Err(Diagnostic::error("a section without a closed form", section.name.span.clone())),
-        },
+        SectionBody::Computed(body) => {
+            let ComputedSection { shape: ComputedShape::Solid(shape), material: Some(material), .. } = &**body else {
+                return Err(Diagnostic::error("a section without a closed form", section.name.span.clone()));
+            };
+            of_body(shape, material)
+        }
         SectionBody::Resultants { .. } | SectionBody::Full { .. } => {
             Err(Diagnostic::error("a section without a shape", section.name.span.clone()))
         }

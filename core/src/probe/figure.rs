@@ -4,10 +4,9 @@
 use super::place::{BeamPoint, Place};
 use crate::rotation::{Rotation, principal};
 use crate::section::Vector6;
-use crate::section::recovery::{Measure, Recovery};
+use crate::section::recovery::{Measure, PlacedRecovery};
 use crate::system::State;
 use crate::tensor::{Mat3, Vec3};
-use std::sync::Arc;
 
 /// The shape of a scene.
 #[derive(Clone, Default)]
@@ -41,7 +40,7 @@ pub struct LinePoint {
     /// Compliance: strains over resultants, section axes
     pub compliance: [[f64; 6]; 6],
     /// Stresses of the section, where they are wanted and known
-    pub section: Option<Arc<Recovery>>,
+    pub section: Option<PlacedRecovery>,
 }
 
 /// Motion, strains and resultants of a node at a state.
@@ -79,7 +78,7 @@ impl Figure {
     pub fn von_mises(&self, looks: &[Look]) -> Option<Vec<f64>> {
         let points = || self.lines.iter().flat_map(|line| &line.points);
         points().find(|point| point.section.is_some())?;
-        let of_section = |section: &Recovery, look: &Look| {
+        let of_section = |section: &PlacedRecovery, look: &Look| {
             let load = Vector6::from(look.resultant);
             Some(section.largest(Measure::VonMises, &load, f64::NEG_INFINITY)?.value)
         };

@@ -9,7 +9,7 @@ use crate::kernel::shape::gauss;
 use crate::rotation::{Rotation, log};
 use crate::scalar::Jet;
 use crate::section::Vector6;
-use crate::section::recovery::{PointStress, Recovery};
+use crate::section::recovery::{PlacedRecovery, PointStress};
 use crate::system::{Node, State};
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
@@ -125,7 +125,7 @@ pub struct StressPlace {
     /// The point, for resultants
     pub inside: BeamPoint,
     /// The section there
-    pub section: Arc<Recovery>,
+    pub section: PlacedRecovery,
 }
 
 /// A fixed point of the section at a point of a beam.

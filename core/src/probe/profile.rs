@@ -2,9 +2,8 @@
 
 use super::place::BeamPoint;
 use crate::run::{Moment, Snapshot};
-use crate::section::recovery::Recovery;
+use crate::section::recovery::PlacedRecovery;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// A place along a beam.
 #[derive(Clone)]
@@ -12,7 +11,7 @@ pub struct ProfilePlace {
     /// The place
     pub inside: BeamPoint,
     /// Stresses of its section, where they are known
-    pub section: Option<Arc<Recovery>>,
+    pub section: Option<PlacedRecovery>,
 }
 
 /// Resultants along beams.

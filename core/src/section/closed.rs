@@ -50,7 +50,7 @@ impl ClosedForm {
                 let polar = about_2 + about_3;
                 shear(3, [-x3 / polar, x2 / polar]);
                 shear(1, ring_flexure(radii, self.nu, about_3, at));
-                // The same turned by a right angle: 2 to 3, 3 to -2.
+                // A force along 3 is one along 2 that is turned by a right angle: 2 to 3, 3 to -2.
                 let [along, across] = ring_flexure(radii, self.nu, about_2, [x3, -x2]);
                 shear(2, [-across, along]);
             }

@@ -1,8 +1,9 @@
 //! The stresses of a section under the resultants of a beam: the largest over the section of several
 //! measures, and those at fixed points. From closed forms, or from a computed section.
 //!
-//! Resultants N1 N2 N3 M1 M2 M3 are those about the line of the beam, in the axes of the beam.
-//! Places, and stresses at fixed points, are in the coordinates of the shape.
+//! Resultants N1 N2 N3 M1 M2 M3 of a [`Recovery`] are those about the reference point of the section,
+//! in its axes; those of a [`PlacedRecovery`] are about the line of the beam, in the axes of the
+//! beam. Places, and stresses at fixed points, are in the coordinates of the shape.
 
 use super::closed::ClosedForm;
 use super::material::{material_axes, stress_in_material_axes};
@@ -12,7 +13,7 @@ use super::search::{Hit, PointTree, Spread};
 use super::strength::FailureLaw;
 use super::stress::{Corners, NodalStresses, Peak, extreme_principal_stresses, von_mises};
 use super::{Matrix6, Point, Vector6};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// The part of a value by which a sample of a closed form may be below the largest one between
 /// samples
@@ -81,6 +82,13 @@ pub struct Placement {
 }
 
 impl Placement {
+    /// Of a section whose origin lies at `offset` from the line of the beam, along axes 2 and 3 of the
+    /// beam, and whose axes are turned by `turn`, rad.
+    fn beside([x2, x3]: Point, turn: f64) -> Self {
+        let (sin, cos) = libm::sincos(turn);
+        Self { line: [-(cos * x2 + sin * x3), sin * x2 - cos * x3], turn, origin: [0.0; 2] }
+    }
+
     /// The load of the stress field from resultants of the beam.
     fn to_field(self) -> Matrix6 {
         let (sin, cos) = libm::sincos(self.turn);
@@ -142,6 +150,44 @@ pub struct PointStress {
     pub unit: Matrix6,
 }
 
+/// The stresses of a section at a place of a beam: the section may lie beside the line of the beam,
+/// and be turned in its axes. Resultants are those about the line, in the axes of the beam.
+#[derive(Clone, Debug)]
+pub struct PlacedRecovery {
+    section: Arc<Recovery>,
+    /// From resultants of the beam to those about the origin of the section, in its axes
+    to_section: Matrix6,
+}
+
+impl PlacedRecovery {
+    /// With the origin of the section at `offset` from the line of the beam, along axes 2 and 3 of the
+    /// beam, and its axes turned by `turn`, rad.
+    pub fn new(section: Arc<Recovery>, offset: Point, turn: f64) -> Self {
+        Self { section, to_section: Placement::beside(offset, turn).to_field() }
+    }
+
+    /// The section, without its place on the beam.
+    pub fn section(&self) -> &Recovery {
+        &self.section
+    }
+
+    /// The largest value of a measure over the section, if it is above a floor.
+    pub fn largest(&self, measure: Measure, load: &Vector6, floor: f64) -> Option<Peak> {
+        self.section.largest(measure, &(self.to_section * load), floor)
+    }
+
+    /// The largest failure index over the section, if it is above a floor.
+    pub fn largest_index(&self, load: &Vector6, floor: f64) -> Option<Peak> {
+        self.section.largest_index(&(self.to_section * load), floor)
+    }
+
+    /// Stresses at a fixed point, see [`Recovery::at`].
+    pub fn at(&self, at: Point, field: Option<(&Mesh, &NodalStresses, &[bool])>) -> Option<PointStress> {
+        let PointStress { unit } = self.section.at(at, field)?;
+        Some(PointStress { unit: unit * self.to_section })
+    }
+}
+
 impl Recovery {
     /// Of a closed form.
     pub fn closed(name: &str, form: ClosedForm, placement: Placement, law: Option<FailureLaw>) -> Self {
@@ -153,8 +199,9 @@ impl Recovery {
         let point = |[i, j]: [usize; 2]| form.point([along(i, columns, [u0, u1]), along(j, rows, [v0, v1])]);
         let at: Vec<Point> = grid.map(point).collect();
         let units = at.iter().map(|&at| form.unit(at)).collect();
+        let count = at.len() as u32;
         let points = at.into_iter().map(|at| (at, 0)).collect();
-        let laws = vec![(law, Vec::new())];
+        let laws = vec![(law, (0..count).map(|number| (number, [0.0; 2])).collect())];
         Self::new(name, vec![name.to_string()], placement, points, units, laws).with_closed(form)
     }
 
@@ -189,7 +236,7 @@ impl Recovery {
     }
 
     /// From points with unit stresses of the field, and for each material its law with the points
-    /// that have it and their angles beta and theta; none for all points.
+    /// that have it and their angles beta and theta.
     fn new(
         name: &str,
         regions: Vec<String>,
@@ -205,8 +252,6 @@ impl Recovery {
         let tree = PointTree::new(&at, &kind, &units);
         let failures = laws.into_iter().filter_map(|(law, members)| {
             let law = law?;
-            let all = || (0..at.len() as u32).map(|number| (number, [0.0; 2])).collect();
-            let members: Vec<(u32, [f64; 2])> = if members.is_empty() && regions.len() == 1 { all() } else { members };
             let of = |values: &[usize]| members.iter().map(|&(k, _)| values[k as usize]).collect::<Vec<_>>();
             let own_at: Vec<Point> = members.iter().map(|&(k, _)| at[k as usize]).collect();
             let own: Vec<Matrix6> =
@@ -457,6 +502,40 @@ mod tests {
                 assert_eq!(again, Some(found));
                 assert_eq!(section.largest(Measure::VonMises, &load, found.value), None);
             }
+        }
+    }
+
+    #[test]
+    fn a_section_beside_the_line_sees_moments_about_its_origin() {
+        let form = ClosedForm { shape: ClosedShape::Rectangle { half: [1.0, 2.0] }, nu: 0.3 };
+        let section = Arc::new(Recovery::closed("s", form, Placement::default(), None));
+        // Tension along the line bends a section that lies above it, and pulls most at its lower side.
+        let pulled = Vector6::ith(0, 1.0);
+        let above = PlacedRecovery::new(section.clone(), [0.0, 3.0], 0.0);
+        let found = above.largest(Measure::Axial, &pulled, 0.0).expect("a value");
+        assert!((found.value - (1.0 / 8.0 + 3.0 * 2.0 / (32.0 / 3.0))).abs() < 1e-12, "{found:?}");
+        assert!((found.at[1] + 2.0).abs() < 1e-12, "{found:?}");
+        // Turned by a right angle, its axis 2 points to 3 of the beam: the side at -1 is the lower one.
+        let turned = PlacedRecovery::new(section, [0.0, 3.0], 0.5 * PI);
+        let found = turned.largest(Measure::Axial, &pulled, 0.0).expect("a value");
+        assert!((found.value - (1.0 / 8.0 + 3.0 / (8.0 / 3.0))).abs() < 1e-12, "{found:?}");
+        let lower = turned.at([-1.0, 0.0], None).expect("a point");
+        assert!((lower.unit[(0, 0)] - found.value).abs() < 1e-12, "{lower:?}");
+    }
+
+    #[test]
+    fn offset_and_turn_of_a_beam_are_those_of_a_section() {
+        let form = ClosedForm { shape: ClosedShape::Rectangle { half: [1.0, 2.0] }, nu: 0.3 };
+        let turn = 0.4;
+        let own = Arc::new(Recovery::closed("s", form, Placement::default(), None));
+        let placement = Placement::beside([0.7, -0.2], turn);
+        let other = Recovery::closed("s", form, placement, None);
+        let placed = PlacedRecovery::new(own, [0.7, -0.2], turn);
+        for k in 0..6 {
+            let load = Vector6::from_fn(|i, _| if i == k { 1.0 } else { 0.1 });
+            let [a, b] = [placed.largest(Measure::VonMises, &load, 0.0), other.largest(Measure::VonMises, &load, 0.0)];
+            let [a, b] = [a, b].map(|peak| peak.expect("a value").value);
+            assert!((a - b).abs() < 1e-6 * b, "{k}: {a} {b}");
         }
     }
 

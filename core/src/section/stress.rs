@@ -247,8 +247,10 @@ pub fn extreme_principal_stresses(s: &Vector6) -> [f64; 2] {
     if size == 0.0 {
         return [mean; 2];
     }
-    let determinant = a * (b * c - s[3] * s[3]) - s[5] * (s[5] * c - s[3] * s[4]) + s[4] * (s[5] * s[3] - b * s[4]);
-    let cosine = (0.5 * determinant / (size * size * size)).clamp(-1.0, 1.0);
+    // Relative to the size, whose cube may be below the range of numbers.
+    let [a, b, c, s23, s13, s12] = [a, b, c, s[3], s[4], s[5]].map(|value| value / size);
+    let determinant = a * (b * c - s23 * s23) - s12 * (s12 * c - s23 * s13) + s13 * (s12 * s23 - b * s13);
+    let cosine = (0.5 * determinant).clamp(-1.0, 1.0);
     let angle = libm::acos(cosine) / 3.0;
     [mean + 2.0 * size * libm::cos(angle), mean + 2.0 * size * libm::cos(angle + 2.0 / 3.0 * std::f64::consts::PI)]
 }
@@ -281,6 +283,8 @@ mod tests {
             let found = extreme_principal_stresses(&s);
             assert!((found[0] - first).abs().max((found[1] - third).abs()) < 1e-9 * s.amax(), "{s}");
         }
+        let tiny = extreme_principal_stresses(&Vector6::ith(5, 1e-120));
+        assert!((tiny[0] / 1e-120 - 1.0).abs() < 1e-9 && (tiny[1] / 1e-120 + 1.0).abs() < 1e-9, "{tiny:?}");
         assert_eq!(extreme_principal_stresses(&Vector6::new(2.0, 2.0, 2.0, 0.0, 0.0, 0.0)), [2.0; 2]);
     }
 }

@@ -7,6 +7,7 @@ use crate::deck::{
 };
 use crate::scene::mesh::MeshBeam;
 use crate::scene::names::{self, unknown};
+use crate::scene::path;
 use crate::scene::surfaces;
 use beamsim_core::effect::contact::{
     BeamPairs, Chain, ChainNode, ContactLaws, ContactStiffness, Meeting, SceneSurface, Strand, SurfaceCarrier,
@@ -138,20 +139,8 @@ impl Composer<'_> {
         let parties = self.parties(contact, number);
         let with: Vec<Strand> = contact.with.iter().filter_map(|name| self.beam_named(contact, name, number)).collect();
         let radius = parties.iter().chain(&with).map(|party| party.radius).fold(f64::INFINITY, f64::min);
-        let penetration = contact.penetration.unwrap_or(PENETRATION * radius);
-        out.laws.push(ContactLaws {
-            name: contact.name.value.clone(),
-            friction: contact.friction,
-            stick: contact.stick,
-            penetration: if penetration.is_finite() { penetration } else { 1.0 },
-            damping: match contact.damping {
-                ContactDamping::Factor(damping) => damping,
-                ContactDamping::Restitution { restitution, speed } => {
-                    damping_of(restitution, speed).unwrap_or_default()
-                }
-            },
-            amplitude: self.switch(contact.stages.as_ref()),
-        });
+        let laws = self.laws_of(contact, radius);
+        out.laws.push(laws);
         for name in &contact.surfaces {
             let Some(surface) = self.deck.surfaces.iter().position(|surface| surface.name.value == name.value) else {
                 let known = self.deck.surfaces.iter().map(|surface| surface.name.value.as_str());
@@ -169,6 +158,24 @@ impl Composer<'_> {
             }
         }
         self.add_meetings(contact, parties, with, pairs);
+    }
+
+    /// The laws of a contact whose thinnest party has this radius.
+    fn laws_of(&mut self, contact: &deck::Contact, radius: f64) -> ContactLaws {
+        let penetration = contact.penetration.unwrap_or(PENETRATION * radius);
+        ContactLaws {
+            name: contact.name.value.clone(),
+            friction: contact.friction,
+            stick: contact.stick,
+            penetration: if penetration.is_finite() { penetration } else { 1.0 },
+            damping: match contact.damping {
+                ContactDamping::Factor(damping) => damping,
+                ContactDamping::Restitution { restitution, speed } => {
+                    damping_of(restitution, speed).unwrap_or_default()
+                }
+            },
+            amplitude: self.switch(contact.stages.as_ref()),
+        }
     }
 
     /// Adds the meetings of a contact: beams with other beams, and with themselves.
@@ -249,7 +256,8 @@ impl Composer<'_> {
         };
         if found.is_none() {
             let message = format!("the contact needs a `radius` for `{}`", name.value);
-            let help = "only beams with one section of shape = \"circle\" or \"tube\" have a radius of their own";
+            let help = "only beams with one section of shape = \"circle\" or \"tube\" about their line have a radius of \
+                        their own";
             self.report(Diagnostic::error(message, contact.span.clone()).help(help));
         }
         found
@@ -337,9 +345,12 @@ fn shortest_step(deck: &Deck) -> Option<f64> {
     steps.min_by(f64::total_cmp)
 }
 
-/// The radius of a beam whose sections are equal circles or tubes.
+/// The radius of a beam whose sections are equal circles or tubes about its line.
 fn radius_of_sections(deck: &Deck, beam: &str) -> Option<f64> {
     let beam = deck.beams.iter().find(|known| known.name.value == beam)?;
+    if !path::along(beam, beam.offset.as_ref()).is_zero() {
+        return None;
+    }
     let radius = |name: &Spanned<String>| {
         let section = deck.sections.iter().find(|section| section.name.value == name.value)?;
         match section.body {

@@ -52,33 +52,19 @@ impl StageRun<'_> {
                 }
                 Err(failure) => failure,
             };
-            let may_soften = match failure {
-                NewtonFailure::NotConverged { .. }
-                | NewtonFailure::Singular(_)
-                | NewtonFailure::Penetrates { .. }
-                | NewtonFailure::Passes { .. } => true,
-                NewtonFailure::LeapsTooFar { .. }
-                | NewtonFailure::Leaves { .. }
-                | NewtonFailure::TurnsTooFar { .. }
-                | NewtonFailure::NotFinite { .. }
-                | NewtonFailure::StepTooSmall { .. }
-                | NewtonFailure::Interrupted(_) => false,
-            };
+            let may_soften = may_depend_on_stiffness(&failure);
             if lists < MOST_LISTS && self.looks_at_more() {
                 lists += 1;
                 continue;
             }
             if may_soften && self.newton.was_shortened {
-                // A soft contact cannot keep beams apart, whose force ends where centre lines meet.
-                let is_stiffer = stiffenings < MOST_STIFFENINGS;
-                let factor = if is_stiffer { self.good.contacts.first_factor * GROWTH } else { first_factor };
-                self.set_first_factor(factor.min(STIFFEST_START));
-                if !is_stiffer {
+                if stiffenings == MOST_STIFFENINGS {
+                    self.set_first_factor(first_factor.min(STIFFEST_START));
+                    self.good.contacts.goes_on = true;
                     return Err(failure);
                 }
                 stiffenings += 1;
-                self.counters.contacts.stiffenings += 1;
-                self.state.copy_all_but_rates(self.good);
+                self.stiffen();
                 continue;
             }
             if may_soften && self.good.contacts.goes_on && self.good.contacts.touches() {
@@ -96,6 +82,14 @@ impl StageRun<'_> {
             self.counters.contacts.softenings += 1;
             self.state.copy_all_but_rates(self.good);
         }
+    }
+
+    /// Goes back to the last good state with a stiffer contact: a soft one cannot keep beams apart,
+    /// whose force ends where centre lines meet.
+    fn stiffen(&mut self) {
+        self.set_first_factor((self.good.contacts.first_factor * GROWTH).min(STIFFEST_START));
+        self.counters.contacts.stiffenings += 1;
+        self.state.copy_all_but_rates(self.good);
     }
 
     /// True if some point of the present iterate has a force.
@@ -163,5 +157,21 @@ impl StageRun<'_> {
             self.state.contacts.first_factor = grown.min(STIFFEST_START);
         }
         Ok(())
+    }
+}
+
+/// True for failures that another first stiffness of contacts may avoid.
+fn may_depend_on_stiffness(failure: &NewtonFailure) -> bool {
+    match failure {
+        NewtonFailure::NotConverged { .. }
+        | NewtonFailure::Singular(_)
+        | NewtonFailure::Penetrates { .. }
+        | NewtonFailure::Passes { .. } => true,
+        NewtonFailure::LeapsTooFar { .. }
+        | NewtonFailure::Leaves { .. }
+        | NewtonFailure::TurnsTooFar { .. }
+        | NewtonFailure::NotFinite { .. }
+        | NewtonFailure::StepTooSmall { .. }
+        | NewtonFailure::Interrupted(_) => false,
     }
 }

@@ -257,24 +257,38 @@ impl<'a> PairRole<'a> {
         }
     }
 
-    /// Adds the normal force per length on a beam at a part of its length, between points linear.
+    /// The normal force per length on a beam at a part of its length: of nodes, and linear between
+    /// them.
     pub fn force_along(self, beam: usize, fraction: f64, at: &State) -> f64 {
         let mut sum = 0.0;
         for (number, strand) in self.pairs.strands.iter().enumerate().filter(|(_, strand)| strand.beam == Some(beam)) {
-            let along = strand.along(fraction);
-            let width = 1.0 / strand.order as f64;
-            for point in &*at.contacts.pairs.points {
-                let strands = self.pairs.meetings[point.meeting as usize].strands;
-                for (side, place) in [point.point.place, point.on_second].into_iter().enumerate() {
-                    let away = (place - along).abs() / width;
-                    if strands[side] == number && away < 1.0 {
-                        // A force at a point is spread over the way to its neighbours.
-                        let spread = strand.length / strand.elements() as f64 * width;
-                        sum += point.weight * point.point.force * (1.0 - away) / spread;
-                    }
+            let place = strand.along(fraction) * strand.order as f64;
+            let before = place.floor();
+            let part = place - before;
+            for (node, factor) in [(before, 1.0 - part), (before + 1.0, part)] {
+                if factor > 0.0 {
+                    sum += factor * self.force_at_node(number, node, at);
                 }
             }
         }
         sum
+    }
+
+    /// The normal force per length at a node of a strand, by its number there: linear shape functions
+    /// distribute the forces of points to the nodes beside them.
+    fn force_at_node(self, number: usize, node: f64, at: &State) -> f64 {
+        let strand = &self.pairs.strands[number];
+        let order = strand.order as f64;
+        let mut force = 0.0;
+        for point in &*at.contacts.pairs.points {
+            let strands = self.pairs.meetings[point.meeting as usize].strands;
+            for (side, place) in [point.point.place, point.on_second].into_iter().enumerate() {
+                if strands[side] == number {
+                    let near = 1.0 - (place * order - node).abs();
+                    force += point.weight * point.point.force * near.max(0.0);
+                }
+            }
+        }
+        force / strand.share(node / order)
     }
 }
