@@ -258,3 +258,152 @@ fn wrong_input_files_are_refused_at_their_place() {
         let _ = abaqus(&[&lines[..line], &["*"], &lines[line..]].concat().join("\n"));
     }
 }
+
+fn abaqus_notes(text: &str) -> Vec<String> {
+    abaqus_deck(&read_abaqus("a.inp", text).unwrap()).unwrap().notes
+}
+
+fn with(from: &str, to: &str) -> String {
+    assert!(CANTILEVER.contains(from), "{from}");
+    CANTILEVER.replace(from, to)
+}
+
+/// A set of a line load may be any part of a straight run: the run is split where the load ends.
+#[test]
+fn line_loads_of_any_set_are_written() {
+    let part = with(
+        "*CLOAD\n5, 3, 1E-6",
+        "*ELSET, ELSET=\"Outer-1\"\n2\n*DLOAD\nOuter-1, PZ, -1E-6\nARM, PY, 2E-6\n1, PX, 0.",
+    );
+    let deck = abaqus(&part).unwrap();
+    assert_eq!(deck.matches("[[beam]]").count(), 2, "{deck}");
+    assert_eq!(deck.matches("force = [0.0, 0.0, -1e-6]").count(), 1, "{deck}");
+    assert!(deck.contains("along = \"arm_2\"\nforce = [0.0, 0.0, -1e-6]"), "{deck}");
+    assert_eq!(deck.matches("force = [0.0, 2e-6, 0.0]").count(), 2, "{deck}");
+    let whole = with("*CLOAD\n5, 3, 1E-6", "*ELSET, ELSET=OTHER\nARM\n*DLOAD\nOTHER, PZ, -1E-6");
+    let deck = abaqus(&whole).unwrap();
+    assert_eq!(deck.matches("[[beam]]").count(), 1, "{deck}");
+    assert!(deck.contains("along = \"arm\"\nforce = [0.0, 0.0, -1e-6]"), "{deck}");
+}
+
+/// GRAV has an acceleration, and a direction whose length does not count.
+#[test]
+fn gravity_has_the_length_of_its_number() {
+    let deck = abaqus(&with("*CLOAD\n5, 3, 1E-6", "*DLOAD\nARM, GRAV, 9.81, 0., 0., -2.")).unwrap();
+    assert!(deck.contains("gravity = [0.0, 0.0, -9.81]"), "{deck}");
+    let deck = abaqus(&with("*CLOAD\n5, 3, 1E-6", "*DLOAD\n, GRAV, 10., 0., -4., 0.")).unwrap();
+    assert!(deck.contains("gravity = [0.0, -10.0, 0.0]"), "{deck}");
+}
+
+/// Elements of the plane stay in it: the nodes of a B22 have no uz, rx, ry.
+#[test]
+fn planar_elements_stay_in_their_plane() {
+    let deck = abaqus(&with("TYPE=B32", "TYPE=B22").replace("5, 3, 1E-6", "5, 2, 1E-6")).unwrap();
+    assert!(deck.contains("at = \"n1\"\nfix = \"all\""), "{deck}");
+    assert_eq!(deck.matches("fix = [\"uz\", \"rx\", \"ry\"]").count(), 4, "{deck}");
+    let bending = 1e-6 * 8.0 / (3.0 * 1000.0 * 0.1 * 0.008 / 12.0);
+    let run = simulate(&format!("{deck}[output]\nnodes = [\"n5\"]\ncolumns = [\"u\"]\n"));
+    assert!(run.end("n5.uy") > bending && run.end("n5.uy") < 1.02 * bending, "{}", run.end("n5.uy"));
+}
+
+#[test]
+fn names_that_become_alike_stay_apart() {
+    let text = "*NODE
+1, 0
+2, 1
+3, 2
+4, 2, 1
+*ELEMENT, TYPE=B31, ELSET=\"A-1\"
+1, 1, 2
+*ELEMENT, TYPE=B31, ELSET=A_1
+2, 2, 3
+3, 3, 4
+*MATERIAL, NAME=\"M-1\"
+*ELASTIC
+1., 0.25
+*MATERIAL, NAME=M_1
+*ELASTIC
+2., 0.25
+*BEAM SECTION, ELSET=A-1, MATERIAL=M-1, SECTION=CIRC
+0.1
+*BEAM SECTION, ELSET=\"A_1\", MATERIAL=M_1, SECTION=CIRC
+0.1
+0, 0, 1
+";
+    let deck = abaqus(text).unwrap();
+    for name in ["[material.m_1]", "[material.m_1_2]", "[section.a_1]", "[section.a_1_2]"] {
+        assert_eq!(deck.matches(name).count(), 1, "{name}\n{deck}");
+    }
+    let names: Vec<&str> = deck.lines().filter(|line| line.starts_with("name = ")).collect();
+    let mut alone = names.clone();
+    alone.sort_unstable();
+    alone.dedup();
+    assert_eq!((names.len(), alone.len()), (3, 3), "{deck}");
+}
+
+/// Parts of a file that are left out are noted with their line.
+#[test]
+fn all_that_is_left_out_is_noted() {
+    let cases = [
+        (
+            with("1, 1, 6", "1, 1, 6\n9, 1, 3").replace("5, 2.0", "5, 2.0\n9, 9."),
+            "line 18: *BOUNDARY is not imported at nodes that belong to no beam: 9",
+        ),
+        (
+            with("5, 3, 1E-6", "5, 3, 1E-6\n9, 1, 3.").replace("5, 2.0", "5, 2.0\n9, 9."),
+            "line 22: *CLOAD is not imported at nodes",
+        ),
+        (with("*CLOAD", "*CLOAD, AMPLITUDE=RAMP"), "line 19: the parameter AMPLITUDE of *CLOAD"),
+        (with("*BOUNDARY", "*BOUNDARY, OP=NEW"), "line 15: the parameter OP of *BOUNDARY"),
+    ];
+    for (text, told) in cases {
+        let notes = abaqus_notes(&text);
+        assert!(notes.len() == 1 && notes[0].starts_with(told), "{notes:?}\nexpected {told}");
+    }
+    assert!(abaqus_notes(CANTILEVER).is_empty());
+    assert!(abaqus_notes(&with("*BOUNDARY", "*BOUNDARY, OP=MOD")).is_empty());
+}
+
+/// A file whose geometry, material or numbers would change unseen is refused at the place.
+#[test]
+fn what_means_two_things_is_refused_at_its_place() {
+    let second = "2, 3, 4, 5\n";
+    let dload = |line: &str| with("*CLOAD\n5, 3, 1E-6", &format!("*DLOAD\n{line}"));
+    let section = "*BEAM SECTION, ELSET=ARM, MATERIAL=STEEL-1, SECTION=RECT\n0.1, 0.2\n";
+    let cases = [
+        (with("*NODE", "*PART, NAME=A\n*END PART\n*PART, NAME=B\n*NODE"), "a.inp:3:1: a second *PART"),
+        (with("*NODE", "*INSTANCE, NAME=A\n*END INSTANCE\n*INSTANCE, NAME=B\n*NODE"), "a.inp:3:1: a second *INSTANCE"),
+        (with("5, 2.0", "4, 2.0"), "a.inp:6:1: node 4 is given twice"),
+        (with(second, "1, 3, 4, 5\n"), "a.inp:9:1: element 1 is given twice"),
+        (with("*STEP", &format!("{section}*STEP")), "a.inp:17:1: element 1 has a *BEAM SECTION already, at line 13"),
+        (with(second, "*ELEMENT, TYPE=B32\n2, 1, 2, 3\n"), "a.inp:10:1: element 2 has no *BEAM SECTION"),
+        (with("*NODE", "*NODE, SYSTEM=C"), "a.inp:1:8: the parameter SYSTEM of *NODE"),
+        (with("SECTION=RECT", "SECTION=RECT, OFFSET1=0.5"), "a.inp:13:59: the parameter OFFSET1 of *BEAMSECTION"),
+        (with(second, "2, 3, 4, 5, 1\n"), "a.inp:9:13: a node of orientation"),
+        (with("1000., 0.25", "1000., 0.25, 20.\n900., 0.25, 100."), "a.inp:13:1: *ELASTIC that depends on temperature"),
+        (with("*MATERIAL, NAME=Steel-1", "*MATERIAL, NAME=Steel-1\n*MATERIAL, NAME=\"STEEL-1\""), "is given twice"),
+        (with("*NODE", "*TRANSFORM, NSET=A\n*NODE"), "a.inp:1:1: *TRANSFORM is not imported"),
+        (with("3, 1.0", "3, 1.0, 0., 0., 0., 1., 0."), "a.inp:4:17: a normal at a node"),
+        (dload("2, GRAV, 9.81, 0., 0., -1."), "a.inp:20:1: GRAV is imported only for all beam elements"),
+        (dload("ARM, GRAV, 9.81"), "a.inp:20:1: GRAV needs"),
+        (dload("ARM, GRAV, 9.81, 0., 0., -1.\nARM, GRAV, 1., 1., 0., 0."), "a.inp:21:1: a second GRAV"),
+        (dload("9, PX, 1."), "a.inp:20:1: `9` has no beam elements"),
+        (with("1, 1, 6", "1, 6, 1"), "a.inp:16:7: the last direction, 1, is below the first, 6"),
+        (
+            with("*BOUNDARY", "*NSET, NSET=S, GENERATE\n5, 1\n*BOUNDARY"),
+            "a.inp:16:1: GENERATE goes up, but 1 is below 5",
+        ),
+        (
+            with("TYPE=B32", "TYPE=B22").replace("5, 2.0", "5, 2.0, 0., 1."),
+            "a.inp:9:1: an element of type B22 must lie in the plane",
+        ),
+        (
+            with("*BOUNDARY", "*NSET, NSET=S\n1\n*ASSEMBLY\n*NSET, NSET=S\n5\n*BOUNDARY"),
+            "a.inp:18:1: the set S is one of the part and one of the assembly",
+        ),
+    ];
+    for (text, told) in cases {
+        let message = abaqus(&text).expect_err(told);
+        assert!(message.contains(told), "{message}\nexpected {told}");
+    }
+}
