@@ -58,24 +58,109 @@ fn damping_and_matrices_are_in_the_order_of_sections() {
     assert!(first.find("18113600000.0").unwrap() < first.find("18110000000.0").unwrap(), "{first}");
 }
 
-/// A blade that bends and sweeps is a spline; point loads find nodes.
-#[test]
-fn curved_blades_are_splines() {
-    let primary = text("nrel_5mw.dat");
-    let mut curved = String::new();
-    for line in primary.lines() {
+/// The primary file with other key points: x, y and twist in degrees over z.
+fn with_keys(primary: &str, key: impl Fn(f64, f64) -> [f64; 3]) -> String {
+    let line = |line: &str| {
         let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
         match numbers[..] {
             [0.0, 0.0, z, twist] if line.contains('E') => {
-                let s = z / 61.5;
-                curved += &format!("{} {} {z} {twist}\n", -4.0 * s * s, 0.8 * s * s * s);
+                let [x, y, twist] = key(z, twist);
+                format!("{x} {y} {z} {twist}\n")
             }
-            _ => curved += &format!("{line}\n"),
+            _ => format!("{line}\n"),
+        }
+    };
+    primary.lines().map(line).collect()
+}
+
+/// The primary file of a blade that bends and sweeps.
+fn bent(primary: &str) -> String {
+    with_keys(primary, |z, twist| {
+        let s = z / 61.5;
+        [-4.0 * s * s, 0.8 * s * s * s, twist]
+    })
+}
+
+/// The driver file with a force of 500 N along y at a fraction of the length.
+fn point_load(eta: &str) -> String {
+    text("nrel_5mw_driver.dat").replace("0   NumPointLoads", "1   NumPointLoads").replace(
+        "(N-m)        (N-m)        (N-m)\n",
+        &format!("(N-m)        (N-m)        (N-m)\n{eta} 0 500 0 0 0 0\n"),
+    )
+}
+
+/// The numbers of a list of a deck.
+fn list_of(deck: &str, key: &str) -> Vec<f64> {
+    let begin = deck.find(&format!("\n{key} = [")).unwrap() + key.len() + 5;
+    let end = begin + deck[begin..].find(']').unwrap();
+    deck[begin..end].split(',').filter_map(|word| word.trim().parse().ok()).collect()
+}
+
+/// Angles go on where the twist passes half a turn.
+#[test]
+fn twist_goes_on_beyond_half_a_turn() {
+    let primary = with_keys(&text("nrel_5mw.dat"), |z, _| [0.0, 0.0, 170.0 + 40.0 * z / 61.5]);
+    let deck = nrel(&primary, &text("nrel_5mw_blade.dat"), None).unwrap();
+    let twist = list_of(&deck, "twist");
+    assert!(twist.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.2), "{twist:?}");
+    assert!((twist[twist.len() - 1] - twist[0] + 40.0_f64.to_radians()).abs() < 1e-9, "{twist:?}");
+}
+
+/// A point load beside a station acts at the station, which is a node.
+#[test]
+fn point_loads_beside_a_station_act_there() {
+    let blade = text("nrel_5mw_blade.dat");
+    let deck = nrel(&text("nrel_5mw.dat"), &blade, None).unwrap();
+    for station in [0, 3, 22] {
+        let eta = list_of(&deck, "stations")[station];
+        for shift in [1e-9, 5e-7, -5e-7] {
+            let place = eta + shift;
+            if !(0.0..=1.0).contains(&place) {
+                continue;
+            }
+            let loaded = nrel(&text("nrel_5mw.dat"), &blade, Some(&point_load(&format!("{place:?}")))).unwrap();
+            assert!(
+                loaded.contains(&format!("at = \"blade@{eta:?}\"\nforce = [0.0, 500.0, 0.0]")),
+                "{place}\n{loaded}"
+            );
         }
     }
-    let driver = text("nrel_5mw_driver.dat")
-        .replace("0   NumPointLoads", "1   NumPointLoads")
-        .replace("(N-m)        (N-m)        (N-m)\n", "(N-m)        (N-m)        (N-m)\n0.7 0 500 0 0 0 0\n");
+}
+
+/// Each member has a natural spline of its own, and is a beam; the beams meet at named points.
+#[test]
+fn members_are_beams_that_meet() {
+    let members = "2   member_total    - Total number of members (-)
+         23   kp_total        - Total number of key points (-)
+     1     12                - Member number; Number of key points in this member
+     2     12                - Member number; Number of key points in this member
+";
+    let primary = bent(&text("nrel_5mw.dat"));
+    let begin = primary.find("1   member_total").unwrap();
+    let end = primary.find("   kp_xr").unwrap();
+    let two = format!("{}{members}{}", &primary[..begin], &primary[end..]);
+    let blade = text("nrel_5mw_blade.dat");
+    let deck = nrel(&two, &blade, Some(&point_load("0.7"))).unwrap();
+    assert!(deck.contains("[point]\nmember_2 = [") && deck.contains("at = \"blade_2@"), "{deck}");
+    assert_eq!((deck.matches("\"member_2\"").count(), deck.matches("[[beam]]").count()), (2, 2), "{deck}");
+    let one = simulate(&nrel(&primary, &blade, Some(&point_load("0.7"))).unwrap()).end("blade@end.ux");
+    let two = simulate(&deck).end("blade_2@end.ux");
+    assert!((two / one - 1.0).abs() < 0.01, "{two} against {one}");
+}
+
+#[test]
+fn a_pitch_actuator_is_noted() {
+    let primary =
+        text("nrel_5mw.dat").replace("END of", "True  UsePitchAct - Whether a pitch actuator is used\nEND of");
+    let deck = nrel(&primary, &text("nrel_5mw_blade.dat"), None).unwrap();
+    assert!(deck.contains("# the pitch actuator (UsePitchAct) is not imported: the root is clamped"), "{deck}");
+}
+
+/// A blade that bends and sweeps is a spline; point loads find nodes.
+#[test]
+fn curved_blades_are_splines() {
+    let curved = bent(&text("nrel_5mw.dat"));
+    let driver = point_load("0.7");
     let deck = nrel(&curved, &text("nrel_5mw_blade.dat"), Some(&driver)).unwrap();
     assert!(deck.contains("spline = [") && deck.contains("at = \"blade@0.7\""), "{deck}");
     let run = simulate(&deck);
@@ -108,6 +193,14 @@ fn wrong_files_are_refused_at_their_place() {
         (
             nrel(&primary, &blade.replace("1.811360E+10", "-1.811360E+10"), None),
             "the stiffness of station 1 is not positive definite",
+        ),
+        (
+            nrel(&primary.replace("0.0   rhoinf", "1.5   rhoinf"), &blade, None),
+            "p.dat:6:9: `rhoinf` must be from 0 to 1, found 1.5",
+        ),
+        (
+            nrel(&primary, &blade, Some(&driver.replace("GlbPos(3)", "GlbPos"))),
+            "d.dat: there is no line with `GlbPos(3)`",
         ),
         (nrel(&primary, &blade, Some(&driver.replacen("1.0000000E+00  0.0000000E+00", "0.5  0.5", 1))), "GlbDCM"),
     ];
