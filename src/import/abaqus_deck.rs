@@ -48,7 +48,8 @@ impl<'m> Names<'m> {
     }
 }
 
-/// The deck of a model: a beam for each straight run of elements with one section and one line load.
+/// The deck of a model: a beam for each straight run of elements with one section and the same line
+/// loads.
 pub fn abaqus_deck(model: &Model) -> Result<Imported, ImportError> {
     refuse_elements_without_one_section(model)?;
     let mut names = Names::new(model);

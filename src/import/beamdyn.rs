@@ -78,8 +78,8 @@ pub struct Driver {
     pub notes: Vec<String>,
 }
 
-/// Reads a primary file, and the blade file that it names: `open` gives the path and the text of the
-/// blade file.
+/// Reads a primary file, and the blade file that it names: `open` gives the path and the text of
+/// that one.
 pub fn read_blade(
     name: &str,
     text: &str,
