@@ -549,6 +549,16 @@ mod tests {
         }
     }
 
+    /// The kind of other programs is a joint that slides along its own axis, or along a beam.
+    #[test]
+    fn sliders_lead_to_their_table() {
+        for written in ["slider", "slide", "sliding"] {
+            let told = hint("kind", written, &["revolute", "prismatic"]).unwrap();
+            assert!(told.contains("[[slider]]") && told.contains("prismatic"), "{told}");
+            assert!(hint("fix", written, &["ux", "all"]).unwrap().contains("[[slider]]"));
+        }
+    }
+
     /// A hint that leads to a word which the deck does not have would mislead again.
     #[test]
     fn synonyms_lead_to_keys_and_words_of_the_deck() {

@@ -121,7 +121,7 @@ impl Reader<'_> {
     }
 
     fn note(&mut self, block: &Block, why: &str) {
-        let note = format!("line {}: *{} {why}", block.line + 1, block.name);
+        let note = format!("line {}: *{} {why}", block.line + 1, shown(&block.name));
         self.model.notes.push(note);
     }
 
@@ -189,12 +189,16 @@ impl Reader<'_> {
             "B22" | "B22H" | "B32" | "B32H" | "B32R" => 3,
             _ => {
                 self.note(block, &format!("of type {} is not imported", shown(&kind)));
-                return Ok(());
+                0
             }
         };
         let set = block.get("ELSET").map(|word| word.text.to_uppercase());
         if let Some(name) = &set {
             self.enter_set(block, "ELSET", name)?;
+            self.model.element_sets.entry(name.clone()).or_default();
+        }
+        if count == 0 {
+            return Ok(());
         }
         if self.steps > 0 {
             return Err(self.lines.error(block.line, 1, "elements must stand above the first *STEP"));
@@ -211,7 +215,7 @@ impl Reader<'_> {
                 let message = format!("there is no node {} above this line", labels[k]);
                 return Err(self.lines.error(line, fields[k].column, message));
             }
-            if let Some(word) = fields.get(count + 1) {
+            if let Some(word) = fields.iter().skip(count + 1).find(|word| !word.text.is_empty()) {
                 let message = "a node of orientation is not imported: give n1 in the second line of *BEAM SECTION";
                 return Err(self.lines.error(line, word.column, message));
             }
@@ -438,7 +442,9 @@ impl Reader<'_> {
                 let mut force = [0.0; 3];
                 force[axis] = value;
                 let elements = self.loaded(line, set)?;
-                self.model.line_loads.push(LineLoad { elements, force });
+                if value != 0.0 {
+                    self.model.line_loads.push(LineLoad { elements, force });
+                }
             } else if kind.text.eq_ignore_ascii_case("GRAV") {
                 self.gravity(line, set, value, rest)?;
             } else {

@@ -1,7 +1,7 @@
 //! The deck of beams of Abaqus or CalculiX.
 
 use super::abaqus_model::{Analysis, BeamSection, Model, NodeLoad, Profile};
-use super::deck_text::{Imported, list, number, quoted};
+use super::deck_text::{Imported, comment, list, number, quoted};
 use super::lines::ImportError;
 use beamsim_core::tensor::Vec3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -127,10 +127,10 @@ fn wrong(model: &Model, line: usize, message: impl Into<String>) -> ImportError 
 
 fn head(text: &mut String, model: &Model, notes: &[String]) {
     let _ = writeln!(text, "#:schema beamsim.schema.json");
-    let _ = writeln!(text, "# From {}", model.file);
+    let _ = writeln!(text, "# From {}", comment(&model.file));
     *text += "#\n# Local axes 2 and 3 are n1 and n2. Node 12 is the point n12; straight runs of elements are beams.\n";
     for note in notes {
-        let _ = writeln!(text, "# Not imported: {note}");
+        let _ = writeln!(text, "# {}", comment(note));
     }
     let _ = writeln!(text, "title = {}", quoted(&model.title));
     if let Some(gravity) = model.gravity {
@@ -267,7 +267,7 @@ fn write_section(
             keys
         }
     };
-    let _ = writeln!(text, "[section.{name}] # {}, line {}", model.file, section.line);
+    let _ = writeln!(text, "[section.{name}] # {}, line {}", comment(&model.file), section.line);
     let _ = writeln!(text, "material = \"{}\"\nshape = \"{}\"", names.materials[section.material.as_str()], keys[0].0);
     for (key, value) in &keys[1..] {
         let _ = writeln!(text, "{key} = {}", number(*value));

@@ -1,12 +1,13 @@
 //! The deck of a blade of BeamDyn.
 
 use super::beamdyn::{Blade, BladeStation, Driver, KeyPoint};
-use super::deck_text::{Imported, list, number, quoted, wrapped};
+use super::deck_text::{Imported, comment, list, number, quoted, wrapped};
 use crate::scene::{NaturalSpline, Spline};
 use beamsim_core::tensor::Vec3;
 use nalgebra::Matrix6;
 use std::f64::consts::PI;
 use std::fmt::Write;
+use std::ops::Range;
 
 /// Fractions of the length that are one place.
 const ONE_PLACE: f64 = 1e-6;
@@ -117,8 +118,10 @@ impl Member {
         }
     }
 
-    fn has(&self, place: f64) -> bool {
-        (self.start - 2.0 * ONE_PLACE..=self.end + 2.0 * ONE_PLACE).contains(&place)
+    /// The numbers of those of these places, which increase, that lie on it.
+    fn range(&self, places: &[f64]) -> Range<usize> {
+        let first = places.partition_point(|place| *place < self.start - 2.0 * ONE_PLACE);
+        first..places.partition_point(|place| *place <= self.end + 2.0 * ONE_PLACE)
     }
 
     /// The angle of the section axes about the tangent at a fraction of its length, against axes
@@ -160,7 +163,7 @@ impl Axis {
     /// A place of the deck at a fraction of the length of the blade.
     fn place_name(&self, place: f64) -> String {
         let last = self.members.len() - 1;
-        let member = self.members.iter().position(|member| member.has(place)).unwrap_or(last);
+        let member = self.members.partition_point(|member| member.end + 2.0 * ONE_PLACE < place).min(last);
         format!("{}@{}", self.beam_name(member), number(self.members[member].own(place)))
     }
 
@@ -239,14 +242,19 @@ fn station(blade: &Blade, fraction: f64) -> Station {
 
 fn head(text: &mut String, blade: &Blade, driver: Option<&Driver>, notes: &[String]) {
     let _ = writeln!(text, "#:schema beamsim.schema.json");
-    let _ = writeln!(text, "# From files of BeamDyn: {} (key points), {} (sections)", blade.primary, blade.file);
+    let _ = writeln!(
+        text,
+        "# From files of BeamDyn: {} (key points), {} (sections)",
+        comment(&blade.primary),
+        comment(&blade.file)
+    );
     if let Some(driver) = driver {
-        let _ = writeln!(text, "# and {} (loads)", driver.file);
+        let _ = writeln!(text, "# and {} (loads)", comment(&driver.file));
     }
     *text += "#\n# Global axes are those of the root frame of the blade. Local axes 1, 2, 3 are z, x, y of its sections, so that\n\
               # rows x y z x y z of its matrices are rows 2 3 1 2 3 1 here. The twist of BeamDyn is about -z.\n";
     for note in notes {
-        let _ = writeln!(text, "# {note}");
+        let _ = writeln!(text, "# {}", comment(note));
     }
     let _ = writeln!(text, "title = {}", quoted(&blade.title));
     *text += "units = { length = \"m\", force = \"N\", time = \"s\" }\n";
@@ -262,7 +270,7 @@ fn section_name(number: usize, count: usize) -> String {
 }
 
 fn section(text: &mut String, name: &str, station: &Station) {
-    let _ = writeln!(text, "[section.{name}] # at {}: {}", number(station.fraction), station.source);
+    let _ = writeln!(text, "[section.{name}] # at {}: {}", number(station.fraction), comment(&station.source));
     let _ = writeln!(text, "stiffness = {}", rows(&station.stiffness));
     let _ = writeln!(text, "mass = {}\n", rows(&station.mass));
 }
@@ -294,8 +302,7 @@ fn element_ends(stations: &[f64], longest: f64) -> Vec<f64> {
 
 fn beam(text: &mut String, axis: &Axis, number: usize, places: &[f64]) {
     let member = &axis.members[number];
-    let mut stations: Vec<(usize, f64)> =
-        (0..places.len()).filter(|&k| member.has(places[k])).map(|k| (k, member.own(places[k]))).collect();
+    let mut stations: Vec<(usize, f64)> = member.range(places).map(|k| (k, member.own(places[k]))).collect();
     stations.dedup_by_key(|station| station.1);
     let names: Vec<String> = stations.iter().map(|(k, _)| format!("\"{}\"", section_name(*k, places.len()))).collect();
     let fractions: Vec<f64> = stations.iter().map(|(_, own)| *own).collect();

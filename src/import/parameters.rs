@@ -1,7 +1,7 @@
 //! Parameters of the keywords of Abaqus and CalculiX that are read, and those that are not.
 
 use super::keywords::{Block, Parameter};
-use super::lines::{ImportError, Lines};
+use super::lines::{ImportError, Lines, shown};
 
 /// The parameters of a keyword; all others are noted.
 struct Known {
@@ -77,7 +77,7 @@ pub fn unread_parameters(lines: &Lines, block: &Block) -> Result<Vec<String>, Im
         if known.read.contains(&parameter.name.as_str()) || is_default(parameter) {
             continue;
         }
-        let named = format!("the parameter {} of *{} is not imported", parameter.name, block.name);
+        let named = format!("the parameter {} of *{} is not imported", shown(&parameter.name), block.name);
         if known.refused.contains(&parameter.name.as_str()) {
             return Err(lines.error(parameter.line, parameter.column, named));
         }

@@ -453,6 +453,8 @@ fn all_that_is_left_out_is_noted() {
         let notes = abaqus_notes(&text);
         assert!(notes.len() == 1 && notes[0].starts_with(told), "{notes:?}\nexpected {told}");
     }
+    let mixed = with("*MATERIAL", "*ELEMENT, TYPE=T3D2, ELSET=TIES\n7, 1, 5\n*ELSET, ELSET=EALL\nARM, TIES\n*MATERIAL");
+    assert_eq!(abaqus_notes(&mixed), ["line 10: *ELEMENT of type T3D2 is not imported"]);
     assert!(abaqus_notes(CANTILEVER).is_empty());
     assert!(abaqus_notes(&with("*BOUNDARY", "*BOUNDARY, OP=MOD")).is_empty());
 }
