@@ -1,6 +1,6 @@
 //! Readers of the keywords of Abaqus and CalculiX that describe beams.
 
-use super::abaqus_model::{Analysis, BeamElement, BeamSection, Elastic, LineLoad, Model, Profile};
+use super::abaqus_model::{Analysis, BeamElement, BeamSection, Elastic, Model, Profile};
 use super::keywords::{Block, blocks, label, numbers, set_name};
 use super::lines::{ImportError, Lines, Word, shown};
 use super::parameters::unread_parameters;
@@ -439,11 +439,8 @@ impl Reader<'_> {
             let value = self.lines.number_of(line, value)?;
             let axis = ["PX", "PY", "PZ"].iter().position(|known| kind.text.eq_ignore_ascii_case(known));
             if let Some(axis) = axis {
-                let mut force = [0.0; 3];
-                force[axis] = value;
-                let elements = self.loaded(line, set)?;
-                if value != 0.0 {
-                    self.model.line_loads.push(LineLoad { elements, force });
+                for number in self.loaded(line, set)? {
+                    self.model.line_loads.entry(number).or_default()[axis] += value;
                 }
             } else if kind.text.eq_ignore_ascii_case("GRAV") {
                 self.gravity(line, set, value, rest)?;

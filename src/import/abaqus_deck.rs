@@ -19,11 +19,12 @@ const DIRECTIONS: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
 /// Directions in which nodes of planar elements do not move: uz, rx, ry.
 const OUT_OF_PLANE: [usize; 3] = [2, 3, 4];
 
-/// A straight run of elements with one section.
+/// A straight run of elements with one section and the same line load.
 struct Run {
     name: String,
     nodes: Vec<u64>,
-    elements: Vec<u64>,
+    /// Force per length
+    line_load: [f64; 3],
     /// The order of its elements
     order: usize,
     /// Local axis 3: n2
@@ -49,7 +50,7 @@ impl<'m> Names<'m> {
 }
 
 /// The deck of a model: a beam for each straight run of elements with one section and the same line
-/// loads.
+/// load.
 pub fn abaqus_deck(model: &Model) -> Result<Imported, ImportError> {
     refuse_elements_without_one_section(model)?;
     let mut names = Names::new(model);
@@ -183,7 +184,7 @@ fn runs(model: &Model, section: &BeamSection, names: &mut BTreeSet<String>) -> R
             continue;
         };
         let is_alike = model.elements[after].nodes.len() == model.elements[&number].nodes.len()
-            && model.line_loads.iter().all(|load| load.elements.contains(after) == load.elements.contains(&number));
+            && line_load(model, *after) == line_load(model, number);
         if is_alike && is_straight(model, start, end, ends(*after)[1]) {
             next.insert(number, *after);
         }
@@ -194,17 +195,19 @@ fn runs(model: &Model, section: &BeamSection, names: &mut BTreeSet<String>) -> R
     let run = |(k, &head): (usize, &u64)| {
         let order = model.elements[&head].nodes.len() - 1;
         let mut nodes = model.elements[&head].nodes.clone();
-        let mut elements = vec![head];
         let mut at = head;
         while let Some(&after) = next.get(&at) {
             nodes.extend(&model.elements[&after].nodes[1..]);
-            elements.push(after);
             at = after;
         }
         let name = unique(&if heads.len() == 1 { name.clone() } else { format!("{name}_{}", k + 1) }, names);
-        Ok(Run { axis3: axis3(model, section, &nodes)?, name, nodes, elements, order })
+        Ok(Run { axis3: axis3(model, section, &nodes)?, name, nodes, line_load: line_load(model, head), order })
     };
     heads.iter().enumerate().map(run).collect()
+}
+
+fn line_load(model: &Model, element: u64) -> [f64; 3] {
+    model.line_loads.get(&element).copied().unwrap_or_default()
 }
 
 fn place(model: &Model, node: u64) -> Vec3 {
@@ -324,10 +327,8 @@ fn write_loads(text: &mut String, model: &Model, used: &BTreeSet<u64>, runs: &[R
         }
         *text += "\n";
     }
-    for load in &model.line_loads {
-        for run in runs.iter().filter(|run| load.elements.contains(&run.elements[0])) {
-            let _ = writeln!(text, "[[load]]\nalong = \"{}\"\nforce = {}\n", run.name, list(&load.force));
-        }
+    for run in runs.iter().filter(|run| run.line_load != [0.0; 3]) {
+        let _ = writeln!(text, "[[load]]\nalong = \"{}\"\nforce = {}\n", run.name, list(&run.line_load));
     }
 }
 

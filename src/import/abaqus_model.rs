@@ -31,15 +31,6 @@ pub struct NodeLoad {
     pub line: usize,
 }
 
-/// A force per length.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LineLoad {
-    /// Elements that have it
-    pub elements: BTreeSet<u64>,
-    /// Force per length
-    pub force: [f64; 3],
-}
-
 /// The shape of a section, in its axes n1 and n2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Profile {
@@ -119,8 +110,8 @@ pub struct Model {
     pub held: BTreeMap<u64, Held>,
     /// Forces and moments at nodes
     pub loads: BTreeMap<u64, NodeLoad>,
-    /// Forces per length
-    pub line_loads: Vec<LineLoad>,
+    /// Forces per length on elements
+    pub line_loads: BTreeMap<u64, [f64; 3]>,
     /// Acceleration of gravity
     pub gravity: Option<[f64; 3]>,
     /// The first analysis
