@@ -255,6 +255,7 @@ const SYNONYMS: &[Synonym] = &[
     Synonym { written: &["direction"], meant: &["axis"] },
     Synonym { written: &["expected", "equals", "reference"], meant: &["value"] },
     Synonym { written: &["loads"], meant: &["load"] },
+    Synonym { written: &["slide", "sliding", "sliding_joint", "sliders"], meant: &["slider"] },
     Synonym { written: &["gravity_vector", "grav"], meant: &["gravity"] },
 ];
 
@@ -262,7 +263,7 @@ const SYNONYMS: &[Synonym] = &[
 const WORDS: &[Synonym] = &[
     Synonym { written: &["hinge", "hinged", "pin", "pinned", "rotational", "rotary", "revolute_joint", "hinge_joint"], meant: &["revolute", "pin"] },
     Synonym { written: &["ball", "socket", "ball_joint", "ball_and_socket", "spherical_joint"], meant: &["spherical"] },
-    Synonym { written: &["slider", "slide", "sliding", "translational", "prismatic_joint", "translator"], meant: &["prismatic"] },
+    Synonym { written: &["translational", "prismatic_joint", "translator"], meant: &["prismatic"] },
     Synonym { written: &["cardan", "hooke", "gimbal", "universal_joint", "u_joint"], meant: &["universal"] },
     Synonym { written: &["fixed", "weld", "welded", "clamp", "clamped", "beam_connector", "cantilever"], meant: &["rigid", "all", "space"] },
     Synonym { written: &["encastre", "full", "builtin"], meant: &["all"] },
@@ -338,7 +339,9 @@ const EXPLAINED_WORDS: &[ExplainedWord] = &[
     ExplainedWord { key: "kind", written: &["bushing", "spring", "torsional"], help: "use [[spring]], or `stiffness` of a joint" },
     ExplainedWord { key: "kind", written: &["force", "moment", "dead", "follower"], help: "the kind follows from `force` or `moment`, and `frame`" },
     ExplainedWord { key: "scheme", written: &["implicit_euler", "backward_euler", "bdf", "bdf2", "trbdf2", "wilson", "houbolt", "bathe"], help: "use `generalized_alpha` with rho_inf = 0, which damps fast vibrations most" },
-    ExplainedWord { key: "fix", written: &["roller", "simply_supported", "slider"], help: "list the fixed directions, such as fix = [\"uy\", \"uz\"]" },
+    ExplainedWord { key: "kind", written: &["slider", "slide", "sliding", "sliding_joint"], help: "a joint that slides along its own axis is \"prismatic\"; one that slides along a beam is a [[slider]]" },
+    ExplainedWord { key: "fix", written: &["roller", "simply_supported"], help: "list the fixed directions, such as fix = [\"uy\", \"uz\"]" },
+    ExplainedWord { key: "fix", written: &["slider", "slide", "sliding"], help: "list the fixed directions, such as fix = [\"uy\", \"uz\"]; a node that slides along a beam is a [[slider]]" },
     ExplainedWord { key: "fix", written: &["1", "2", "3", "4", "5", "6", "12", "123", "1234", "12345", "123456", "xsymm", "ysymm", "zsymm", "symmetry"], help: "list the fixed directions by name: ux uy uz rx ry rz" },
     ExplainedWord { key: "fix", written: &["hinge", "hinged"], help: "fix two of rx ry rz, which leaves a hinge about the third" },
 ];
@@ -543,6 +546,16 @@ mod tests {
             [("elments", "elements"), ("ea", "EA"), ("titel", "title"), ("rotary", "rotary_inertia"), ("EAA", "EA")]
         {
             assert_eq!(nearest(written, [known]), Some(known), "{written}");
+        }
+    }
+
+    /// The kind of other programs is a joint that slides along its own axis, or along a beam.
+    #[test]
+    fn sliders_lead_to_their_table() {
+        for written in ["slider", "slide", "sliding"] {
+            let told = hint("kind", written, &["revolute", "prismatic"]).unwrap();
+            assert!(told.contains("[[slider]]") && told.contains("prismatic"), "{told}");
+            assert!(hint("fix", written, &["ux", "all"]).unwrap().contains("[[slider]]"));
         }
     }
 

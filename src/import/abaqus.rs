@@ -1,113 +1,17 @@
-//! Beams of input files of Abaqus and CalculiX.
+//! Readers of the keywords of Abaqus and CalculiX that describe beams.
 
-use super::keywords::{Block, blocks, label, numbers};
+use super::abaqus_model::{Analysis, BeamElement, BeamSection, Elastic, Model, Profile};
+use super::keywords::{Block, blocks, label, numbers, set_name};
 use super::lines::{ImportError, Lines, Word, shown};
+use super::parameters::unread_parameters;
+use beamsim_core::tensor::Vec3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Entries of generated sets, at most.
 const MOST: u64 = 2_000_000;
 
-/// A beam element.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BeamElement {
-    /// Its nodes from start to end: two or three
-    pub nodes: Vec<u64>,
-    /// Line in the file, from 1
-    pub line: usize,
-}
-
-/// The shape of a section, in its axes n1 and n2.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Profile {
-    /// Radius
-    Circle(f64),
-    /// Widths along n1 and n2
-    Ellipse([f64; 2]),
-    /// Outer radius and thickness
-    Pipe([f64; 2]),
-    /// Widths along n1 and n2
-    Rectangle([f64; 2]),
-    /// Widths along n1 and n2, thickness of walls along n2 and along n1
-    Box([f64; 4]),
-    /// Height of the origin, height, widths of the flanges at the bottom and the top, their
-    /// thicknesses, thickness of the web
-    I([f64; 7]),
-}
-
-/// `*BEAM SECTION`
-#[derive(Clone, Debug, PartialEq)]
-pub struct BeamSection {
-    /// Name of its set of elements, in capitals
-    pub set: String,
-    /// Name of its material, in capitals
-    pub material: String,
-    /// Shape
-    pub profile: Profile,
-    /// Direction of n1
-    pub n1: [f64; 3],
-    /// Line in the file, from 1
-    pub line: usize,
-}
-
-/// An isotropic material.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Elastic {
-    /// Young's modulus and Poisson's ratio
-    pub elastic: Option<[f64; 2]>,
-    /// Density
-    pub density: Option<f64>,
-}
-
-/// The first analysis of a file.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Analysis {
-    /// Of equilibrium, with large rotations or without
-    Static {
-        /// NLGEOM
-        large: bool,
-    },
-    /// Of so many modes
-    Modes(usize),
-    /// Over time: end and step
-    Dynamic([f64; 2]),
-}
-
-/// What is read of a file.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Model {
-    /// Name of the file
-    pub file: String,
-    /// First line of `*HEADING`
-    pub title: String,
-    /// Places of nodes
-    pub nodes: BTreeMap<u64, [f64; 3]>,
-    /// Elements of beams
-    pub elements: BTreeMap<u64, BeamElement>,
-    /// Sets of elements
-    pub element_sets: BTreeMap<String, BTreeSet<u64>>,
-    /// Sets of nodes
-    pub node_sets: BTreeMap<String, BTreeSet<u64>>,
-    /// Materials
-    pub materials: BTreeMap<String, Elastic>,
-    /// Sections
-    pub sections: Vec<BeamSection>,
-    /// Directions (0 to 5) in which nodes are held
-    pub held: BTreeMap<u64, BTreeSet<usize>>,
-    /// Forces and moments at nodes
-    pub loads: BTreeMap<u64, [f64; 6]>,
-    /// Forces per length on sets of elements
-    pub line_loads: Vec<(String, [f64; 3])>,
-    /// Acceleration of gravity
-    pub gravity: [f64; 3],
-    /// The first analysis
-    pub analysis: Option<Analysis>,
-    /// What was not imported
-    pub notes: Vec<String>,
-}
-
 /// Keywords that say nothing about the structure.
-const SILENT: [&str; 24] = [
-    "STEP",
+const SILENT: [&str; 18] = [
     "ENDSTEP",
     "OUTPUT",
     "NODEOUTPUT",
@@ -118,14 +22,9 @@ const SILENT: [&str; 24] = [
     "ELPRINT",
     "PREPRINT",
     "RESTART",
-    "PART",
     "ENDPART",
-    "ASSEMBLY",
     "ENDASSEMBLY",
-    "INSTANCE",
     "ENDINSTANCE",
-    "MATERIAL",
-    "HEADING",
     "ENERGYOUTPUT",
     "MONITOR",
     "CONTROLS",
@@ -137,7 +36,15 @@ const SILENT: [&str; 24] = [
 pub fn read_abaqus(name: &str, text: &str) -> Result<Model, ImportError> {
     let lines = Lines::new(name, text);
     let all = blocks(&lines)?;
-    let mut reader = Reader { lines, model: Model { file: name.into(), ..Model::default() }, steps: 0, material: None };
+    let mut reader = Reader {
+        lines,
+        model: Model { file: name.into(), ..Model::default() },
+        steps: 0,
+        material: None,
+        parts: BTreeSet::new(),
+        is_assembly: false,
+        scopes: BTreeMap::new(),
+    };
     for block in &all {
         reader.block(block)?;
     }
@@ -155,10 +62,18 @@ struct Reader<'t> {
     steps: usize,
     /// Name of the material to which properties belong
     material: Option<String>,
+    /// PART and INSTANCE, once they have been
+    parts: BTreeSet<String>,
+    /// True after `*ASSEMBLY`
+    is_assembly: bool,
+    /// True for a set of the assembly, by its keyword and its name
+    scopes: BTreeMap<(String, String), bool>,
 }
 
 impl Reader<'_> {
     fn block(&mut self, block: &Block) -> Result<(), ImportError> {
+        let notes = unread_parameters(&self.lines, block)?;
+        self.model.notes.extend(notes);
         match block.name.as_str() {
             "NODE" => self.nodes(block),
             "ELEMENT" => self.elements(block),
@@ -169,13 +84,16 @@ impl Reader<'_> {
             "CLOAD" => self.loads(block),
             "DLOAD" => self.distributed(block),
             "STATIC" | "FREQUENCY" | "DYNAMIC" => self.analysis(block),
-            "INCLUDE" => Err(self.lines.error(block.line, 1, "*INCLUDE is not imported: put the file in its place")),
-            "INSTANCE" if !block.data.is_empty() => {
-                Err(self.lines.error(block.data[0], 1, "an *INSTANCE that is moved or turned is not imported"))
+            "PART" | "INSTANCE" => self.part(block),
+            "ASSEMBLY" => {
+                self.is_assembly = true;
+                Ok(())
             }
             "MATERIAL" => {
                 let name = block.name_of(&self.lines, "NAME")?;
-                self.model.materials.entry(name.clone()).or_default();
+                if self.model.materials.insert(name.clone(), Elastic::default()).is_some() {
+                    return Err(self.lines.error(block.line, 1, format!("the material {name} is given twice")));
+                }
                 self.material = Some(name);
                 Ok(())
             }
@@ -203,7 +121,7 @@ impl Reader<'_> {
     }
 
     fn note(&mut self, block: &Block, why: &str) {
-        let note = format!("line {}: *{} {why}", block.line + 1, block.name);
+        let note = format!("line {}: *{} {why}", block.line + 1, shown(&block.name));
         self.model.notes.push(note);
     }
 
@@ -215,7 +133,35 @@ impl Reader<'_> {
         self.steps <= 1
     }
 
+    /// Numbers of nodes and elements are those of one part that stands once, where it was drawn.
+    fn part(&mut self, block: &Block) -> Result<(), ImportError> {
+        if !self.parts.insert(block.name.clone()) {
+            let message = format!("a second *{} is not imported: numbers of nodes would mean two things", block.name);
+            return Err(self.lines.error(block.line, 1, message));
+        }
+        match block.data.first() {
+            Some(&line) if block.name == "INSTANCE" => {
+                Err(self.lines.error(line, 1, "an *INSTANCE that is moved or turned is not imported"))
+            }
+            Some(_) | None => Ok(()),
+        }
+    }
+
+    /// Refuses a set of the assembly with the name of a set of the part.
+    fn enter_set(&mut self, block: &Block, kind: &str, name: &str) -> Result<(), ImportError> {
+        let scope = self.scopes.entry((kind.into(), name.into())).or_insert(self.is_assembly);
+        if *scope == self.is_assembly {
+            return Ok(());
+        }
+        let message = format!("the set {name} is one of the part and one of the assembly: give them two names");
+        Err(self.lines.error(block.line, 1, message))
+    }
+
     fn nodes(&mut self, block: &Block) -> Result<(), ImportError> {
+        let set = block.get("NSET").map(|word| word.text.to_uppercase());
+        if let Some(name) = &set {
+            self.enter_set(block, "NSET", name)?;
+        }
         for &line in &block.data {
             let fields = self.lines.fields(line);
             let number = label(&self.lines, line, fields[0])?;
@@ -223,9 +169,14 @@ impl Reader<'_> {
             for (x, field) in place.iter_mut().zip(fields.iter().skip(1)) {
                 *x = if field.text.is_empty() { 0.0 } else { self.lines.number_of(line, *field)? };
             }
-            self.model.nodes.insert(number, place);
-            if let Some(set) = block.get("NSET") {
-                self.model.node_sets.entry(set.text.to_uppercase()).or_default().insert(number);
+            if let Some(word) = fields.iter().skip(4).find(|word| !word.text.is_empty()) {
+                return Err(self.lines.error(line, word.column, "a normal at a node is not imported"));
+            }
+            if self.model.nodes.insert(number, place).is_some() {
+                return Err(self.lines.error(line, fields[0].column, format!("node {number} is given twice")));
+            }
+            if let Some(name) = &set {
+                self.model.node_sets.entry(name.clone()).or_default().insert(number);
             }
         }
         Ok(())
@@ -238,9 +189,20 @@ impl Reader<'_> {
             "B22" | "B22H" | "B32" | "B32H" | "B32R" => 3,
             _ => {
                 self.note(block, &format!("of type {} is not imported", shown(&kind)));
-                return Ok(());
+                0
             }
         };
+        let set = block.get("ELSET").map(|word| word.text.to_uppercase());
+        if let Some(name) = &set {
+            self.enter_set(block, "ELSET", name)?;
+            self.model.element_sets.entry(name.clone()).or_default();
+        }
+        if count == 0 {
+            return Ok(());
+        }
+        if self.steps > 0 {
+            return Err(self.lines.error(block.line, 1, "elements must stand above the first *STEP"));
+        }
         for &line in &block.data {
             let fields = self.lines.fields(line);
             if fields.len() <= count {
@@ -253,9 +215,24 @@ impl Reader<'_> {
                 let message = format!("there is no node {} above this line", labels[k]);
                 return Err(self.lines.error(line, fields[k].column, message));
             }
-            self.model.elements.insert(labels[0], BeamElement { nodes: labels[1..].to_vec(), line: line + 1 });
-            if let Some(set) = block.get("ELSET") {
-                self.model.element_sets.entry(set.text.to_uppercase()).or_default().insert(labels[0]);
+            if let Some(word) = fields.iter().skip(count + 1).find(|word| !word.text.is_empty()) {
+                let message = "a node of orientation is not imported: give n1 in the second line of *BEAM SECTION";
+                return Err(self.lines.error(line, word.column, message));
+            }
+            let is_planar = kind.starts_with("B2");
+            if is_planar && labels[1..].iter().any(|node| self.model.nodes[node][2] != 0.0) {
+                return Err(self.lines.error(
+                    line,
+                    1,
+                    format!("an element of type {kind} must lie in the plane z = 0"),
+                ));
+            }
+            let element = BeamElement { nodes: labels[1..].to_vec(), is_planar, line: line + 1 };
+            if self.model.elements.insert(labels[0], element).is_some() {
+                return Err(self.lines.error(line, fields[0].column, format!("element {} is given twice", labels[0])));
+            }
+            if let Some(name) = &set {
+                self.model.element_sets.entry(name.clone()).or_default().insert(labels[0]);
             }
         }
         Ok(())
@@ -263,6 +240,7 @@ impl Reader<'_> {
 
     fn set(&mut self, block: &Block) -> Result<(), ImportError> {
         let name = block.name_of(&self.lines, &block.name)?;
+        self.enter_set(block, &block.name, &name)?;
         let mut members = BTreeSet::new();
         for &line in &block.data {
             let fields = self.lines.fields(line);
@@ -271,7 +249,10 @@ impl Reader<'_> {
                 let (Some(from), Some(to)) = (of(0)?, of(1)?) else {
                     return Err(self.lines.error(line, 1, "GENERATE needs first, last and step"));
                 };
-                if to.saturating_sub(from) > MOST {
+                if to < from {
+                    return Err(self.lines.error(line, 1, format!("GENERATE goes up, but {to} is below {from}")));
+                }
+                if to - from > MOST {
                     return Err(self.lines.error(line, 1, format!("more than {MOST} entries")));
                 }
                 members.extend((from..=to).step_by(of(2)?.unwrap_or(1) as usize));
@@ -289,9 +270,7 @@ impl Reader<'_> {
     /// A number, or those of a set of nodes (`NSET`) or elements.
     fn members(&self, kind: &str, line: usize, word: Word) -> Result<BTreeSet<u64>, ImportError> {
         let sets = if kind == "NSET" { &self.model.node_sets } else { &self.model.element_sets };
-        // A set of a part or an instance: `beam-1.tip`.
-        let name = word.text.rsplit('.').next().unwrap_or(word.text).trim_matches('"').to_uppercase();
-        if let Some(set) = sets.get(&name) {
+        if let Some(set) = sets.get(&set_name(word)) {
             return Ok(set.clone());
         }
         if word.text.parse::<u64>().is_ok() {
@@ -355,11 +334,18 @@ impl Reader<'_> {
             return Err(self.lines.error(block.line, 1, format!("*{} needs a line of numbers", block.name)));
         };
         let found = numbers(&self.lines, line)?;
+        if let Some(&second) = block.data.get(1) {
+            let message = format!("*{} that depends on temperature is not imported: leave one line", block.name);
+            return Err(self.lines.error(second, 1, message));
+        }
+        let twice = self.lines.error(block.line, 1, format!("the material {name} has *{} twice", block.name));
         let material = self.model.materials.entry(name).or_default();
         match (block.name.as_str(), &found[..]) {
             ("ELASTIC", _) if block.get("TYPE").is_some_and(|word| !word.text.to_uppercase().starts_with("ISO")) => {
                 Err(self.lines.error(block.line, 1, "only isotropic elasticity is imported"))
             }
+            ("ELASTIC", _) if material.elastic.is_some() => Err(twice),
+            ("DENSITY", _) if material.density.is_some() => Err(twice),
             ("ELASTIC", &[young, poisson, ..]) => {
                 material.elastic = Some([young, poisson]);
                 Ok(())
@@ -388,7 +374,12 @@ impl Reader<'_> {
                 _ => {
                     let from = self.direction(line, *first)?;
                     let last = fields.get(2).filter(|word| !word.text.is_empty());
-                    from..=last.map_or(Ok(from), |word| self.direction(line, *word))?
+                    let to = last.map_or(Ok(from), |word| self.direction(line, *word))?;
+                    if to < from {
+                        let message = format!("the last direction, {}, is below the first, {}", to + 1, from + 1);
+                        return Err(self.lines.error(line, fields[2].column, message));
+                    }
+                    from..=to
                 }
             };
             let value = fields.get(3).map_or(Ok(0.0), |word| self.lines.number_of(line, *word))?;
@@ -397,7 +388,9 @@ impl Reader<'_> {
                 self.model.notes.push(note);
             }
             for node in nodes {
-                self.model.held.entry(node).or_default().extend(range.clone());
+                let held = self.model.held.entry(node).or_default();
+                held.directions.extend(range.clone());
+                held.line = line + 1;
             }
         }
         Ok(())
@@ -426,7 +419,9 @@ impl Reader<'_> {
             let direction = self.direction(line, direction)?;
             let value = self.lines.number_of(line, value)?;
             for node in self.members("NSET", line, at)? {
-                self.model.loads.entry(node).or_default()[direction] += value;
+                let load = self.model.loads.entry(node).or_default();
+                load.vector[direction] += value;
+                load.line = line + 1;
             }
         }
         Ok(())
@@ -444,22 +439,49 @@ impl Reader<'_> {
             let value = self.lines.number_of(line, value)?;
             let axis = ["PX", "PY", "PZ"].iter().position(|known| kind.text.eq_ignore_ascii_case(known));
             if let Some(axis) = axis {
-                let mut force = [0.0; 3];
-                force[axis] = value;
-                let name = set.text.rsplit('.').next().unwrap_or(set.text).to_uppercase();
-                if !self.model.element_sets.contains_key(&name) {
-                    return Err(self.lines.error(line, set.column, "a line load needs the name of a set of elements"));
+                for number in self.loaded(line, set)? {
+                    self.model.line_loads.entry(number).or_default()[axis] += value;
                 }
-                self.model.line_loads.push((name, force));
-            } else if kind.text.eq_ignore_ascii_case("GRAV") && rest.len() >= 3 {
-                for (k, word) in rest.iter().take(3).enumerate() {
-                    self.model.gravity[k] = value * self.lines.number_of(line, *word)?;
-                }
+            } else if kind.text.eq_ignore_ascii_case("GRAV") {
+                self.gravity(line, set, value, rest)?;
             } else {
                 let note = format!("line {}: the load {} is not imported", line + 1, shown(kind.text));
                 self.model.notes.push(note);
             }
         }
+        Ok(())
+    }
+
+    /// The beam elements of a set or a number; all of them where the field is empty.
+    fn loaded(&self, line: usize, set: Word) -> Result<BTreeSet<u64>, ImportError> {
+        let is_beam = |number: &u64| self.model.elements.contains_key(number);
+        let elements: BTreeSet<u64> = match set.text.is_empty() {
+            true => self.model.elements.keys().copied().collect(),
+            false => self.members("ELSET", line, set)?.into_iter().filter(is_beam).collect(),
+        };
+        match elements.is_empty() {
+            true => Err(self.lines.error(line, set.column, format!("`{}` has no beam elements", shown(set.text)))),
+            false => Ok(elements),
+        }
+    }
+
+    /// GRAV: acceleration, and the components of its direction, whose length does not count.
+    fn gravity(&mut self, line: usize, set: Word, value: f64, direction: &[Word]) -> Result<(), ImportError> {
+        let wrong = |column: usize, message: &str| Err(self.lines.error(line, column, message));
+        if self.loaded(line, set)?.len() < self.model.elements.len() {
+            return wrong(set.column, "GRAV is imported only for all beam elements: this set lacks some");
+        }
+        if self.model.gravity.is_some() {
+            return wrong(1, "a second GRAV is not imported: give one line with the sum");
+        }
+        let mut vector = [0.0; 3];
+        for (x, word) in vector.iter_mut().zip(direction) {
+            *x = if word.text.is_empty() { 0.0 } else { self.lines.number_of(line, *word)? };
+        }
+        let Some(unit) = Vec3(vector).normalized() else {
+            return wrong(1, "GRAV needs an acceleration and the three components of its direction");
+        };
+        self.model.gravity = Some((unit * value).0);
         Ok(())
     }
 

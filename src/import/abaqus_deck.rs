@@ -1,7 +1,7 @@
 //! The deck of beams of Abaqus or CalculiX.
 
-use super::abaqus::{Analysis, BeamSection, Model, Profile};
-use super::deck_text::{Imported, list, number, quoted};
+use super::abaqus_model::{Analysis, BeamSection, Model, NodeLoad, Profile};
+use super::deck_text::{Imported, comment, list, number, quoted};
 use super::lines::ImportError;
 use beamsim_core::tensor::Vec3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,68 +10,132 @@ use std::fmt::Write;
 /// Sine of the angle between two elements of one straight beam, at most.
 const STRAIGHT: f64 = 1e-6;
 
+/// Nodes in one note, at most.
+const MOST_SHOWN: usize = 10;
+
 /// Words of the six directions of supports.
 const DIRECTIONS: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
 
-/// A straight run of elements with one section.
+/// Directions in which nodes of planar elements do not move: uz, rx, ry.
+const OUT_OF_PLANE: [usize; 3] = [2, 3, 4];
+
+/// A straight run of elements with one section and the same line load.
 struct Run {
     name: String,
     nodes: Vec<u64>,
+    /// Force per length
+    line_load: [f64; 3],
     /// The order of its elements
     order: usize,
     /// Local axis 3: n2
     axis3: [f64; 3],
 }
 
-/// The deck of a model: a beam for each straight run of elements with one section.
+/// The names in a deck that follow from names in a model.
+struct Names<'m> {
+    materials: BTreeMap<&'m str, String>,
+    sections: BTreeSet<String>,
+    /// Names of beams and points
+    places: BTreeSet<String>,
+}
+
+impl<'m> Names<'m> {
+    fn new(model: &'m Model) -> Self {
+        let mut taken = BTreeSet::new();
+        let used: BTreeSet<&str> = model.sections.iter().map(|section| section.material.as_str()).collect();
+        let materials = used.into_iter().map(|name| (name, unique(&plain(name), &mut taken))).collect();
+        let places = model.nodes.keys().map(|node| format!("n{node}")).collect();
+        Self { materials, sections: BTreeSet::new(), places }
+    }
+}
+
+/// The deck of a model: a beam for each straight run of elements with one section and the same line
+/// load.
 pub fn abaqus_deck(model: &Model) -> Result<Imported, ImportError> {
-    let mut text = String::new();
-    head(&mut text, model);
-    let mut used: BTreeSet<u64> = BTreeSet::new();
-    let mut names: BTreeSet<String> = BTreeSet::new();
+    refuse_elements_without_one_section(model)?;
+    let mut names = Names::new(model);
+    let mut all: Vec<Run> = Vec::new();
     let mut beams = String::new();
     let mut sections = String::new();
-    let mut of_set: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for section in &model.sections {
-        let name = unique(&plain(&section.set), &mut names);
-        write_section(&mut sections, model, section, &name)?;
-        for run in runs(model, section, &name)? {
-            used.extend(&run.nodes);
+        let name = unique(&plain(&section.set), &mut names.sections);
+        write_section(&mut sections, model, section, &name, &names)?;
+        for run in runs(model, section, &mut names.places)? {
             write_beam(&mut beams, &run, &name);
-            of_set.entry(&section.set).or_default().push(run.name);
+            all.push(run);
         }
     }
-    if let Some(element) = model.elements.values().find(|element| !used.contains(&element.nodes[0])) {
-        return Err(wrong(model, element.line, "this element has no *BEAM SECTION"));
-    }
+    let used: BTreeSet<u64> = all.iter().flat_map(|run| run.nodes.iter().copied()).collect();
+    let notes: Vec<String> = model.notes.iter().cloned().chain(away_from_beams(model, &used)).collect();
+    let mut text = String::new();
+    head(&mut text, model, &notes);
     text += "[point]\n";
     for (node, place) in model.nodes.iter().filter(|(node, _)| used.contains(node)) {
         let _ = writeln!(text, "n{node} = {}", list(place));
     }
     text += "\n";
-    write_materials(&mut text, model)?;
+    write_materials(&mut text, model, &names)?;
     text += &sections;
     text += &beams;
     write_supports(&mut text, model, &used);
-    write_loads(&mut text, model, &used, &of_set);
+    write_loads(&mut text, model, &used, &all);
     write_stage(&mut text, model);
-    Ok(Imported { deck: text, notes: model.notes.clone() })
+    Ok(Imported { deck: text, notes })
+}
+
+/// Each element must be in the set of exactly one section.
+fn refuse_elements_without_one_section(model: &Model) -> Result<(), ImportError> {
+    let mut lines: BTreeMap<u64, usize> = BTreeMap::new();
+    for section in &model.sections {
+        let Some(set) = model.element_sets.get(&section.set) else {
+            return Err(wrong(model, section.line, format!("there is no set of elements {}", section.set)));
+        };
+        for &number in set {
+            let Some(before) = lines.insert(number, section.line).filter(|_| model.elements.contains_key(&number))
+            else {
+                continue;
+            };
+            let message = format!("element {number} has a *BEAM SECTION already, at line {before}");
+            return Err(wrong(model, section.line, message));
+        }
+    }
+    match model.elements.iter().find(|(number, _)| !lines.contains_key(number)) {
+        Some((number, element)) => Err(wrong(model, element.line, format!("element {number} has no *BEAM SECTION"))),
+        None => Ok(()),
+    }
+}
+
+/// Notes of supports and loads at nodes that belong to no beam.
+fn away_from_beams(model: &Model, used: &BTreeSet<u64>) -> Vec<String> {
+    let supports = model.held.iter().map(|(node, held)| (held.line, "*BOUNDARY", node));
+    let loads = model.loads.iter().map(|(node, load)| (load.line, "*CLOAD", node));
+    let mut found: BTreeMap<(usize, &str), Vec<String>> = BTreeMap::new();
+    for (line, keyword, node) in supports.chain(loads).filter(|(_, _, node)| !used.contains(node)) {
+        found.entry((line, keyword)).or_default().push(node.to_string());
+    }
+    let note = |((line, keyword), nodes): (&(usize, &str), &Vec<String>)| {
+        let shown = nodes.iter().take(MOST_SHOWN).cloned().collect::<Vec<_>>().join(", ");
+        let more =
+            if nodes.len() > MOST_SHOWN { format!(" and {} more", nodes.len() - MOST_SHOWN) } else { String::new() };
+        format!("line {line}: {keyword} is not imported at nodes that belong to no beam: {shown}{more}")
+    };
+    found.iter().map(note).collect()
 }
 
 fn wrong(model: &Model, line: usize, message: impl Into<String>) -> ImportError {
     ImportError { file: model.file.clone(), at: Some([line, 1]), message: message.into() }
 }
 
-fn head(text: &mut String, model: &Model) {
+fn head(text: &mut String, model: &Model, notes: &[String]) {
     let _ = writeln!(text, "#:schema beamsim.schema.json");
-    let _ = writeln!(text, "# From {}", model.file);
+    let _ = writeln!(text, "# From {}", comment(&model.file));
     *text += "#\n# Local axes 2 and 3 are n1 and n2. Node 12 is the point n12; straight runs of elements are beams.\n";
-    for note in &model.notes {
-        let _ = writeln!(text, "# Not imported: {note}");
+    for note in notes {
+        let _ = writeln!(text, "# {}", comment(note));
     }
     let _ = writeln!(text, "title = {}", quoted(&model.title));
-    if model.gravity != [0.0; 3] {
-        let _ = writeln!(text, "gravity = {}", list(&model.gravity));
+    if let Some(gravity) = model.gravity {
+        let _ = writeln!(text, "gravity = {}", list(&gravity));
     }
     *text += "\n";
 }
@@ -79,7 +143,8 @@ fn head(text: &mut String, model: &Model) {
 /// A name as a deck can have it.
 fn plain(name: &str) -> String {
     let kept: String = name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
-    kept.to_lowercase()
+    let is_word = kept.starts_with(|c: char| c.is_ascii_alphabetic());
+    if is_word { kept.to_lowercase() } else { format!("s{}", kept.to_lowercase()) }
 }
 
 fn unique(name: &str, names: &mut BTreeSet<String>) -> String {
@@ -93,11 +158,9 @@ fn unique(name: &str, names: &mut BTreeSet<String>) -> String {
 }
 
 /// The straight runs of the elements of a section, in the order of the elements.
-fn runs(model: &Model, section: &BeamSection, name: &str) -> Result<Vec<Run>, ImportError> {
-    let Some(set) = model.element_sets.get(&section.set) else {
-        return Err(wrong(model, section.line, format!("there is no set of elements {}", section.set)));
-    };
-    let own: Vec<u64> = set.iter().copied().filter(|number| model.elements.contains_key(number)).collect();
+fn runs(model: &Model, section: &BeamSection, names: &mut BTreeSet<String>) -> Result<Vec<Run>, ImportError> {
+    let set = model.element_sets.get(&section.set).into_iter().flatten();
+    let own: Vec<u64> = set.copied().filter(|number| model.elements.contains_key(number)).collect();
     let ends = |number: u64| {
         let nodes = &model.elements[&number].nodes;
         [nodes[0], nodes[nodes.len() - 1]]
@@ -120,13 +183,15 @@ fn runs(model: &Model, section: &BeamSection, name: &str) -> Result<Vec<Run>, Im
         else {
             continue;
         };
-        let orders_alike = model.elements[after].nodes.len() == model.elements[&number].nodes.len();
-        if orders_alike && is_straight(model, start, end, ends(*after)[1]) {
+        let is_alike = model.elements[after].nodes.len() == model.elements[&number].nodes.len()
+            && line_load(model, *after) == line_load(model, number);
+        if is_alike && is_straight(model, start, end, ends(*after)[1]) {
             next.insert(number, *after);
         }
     }
     let followers: BTreeSet<u64> = next.values().copied().collect();
     let heads: Vec<u64> = own.iter().copied().filter(|number| !followers.contains(number)).collect();
+    let name = plain(&section.set);
     let run = |(k, &head): (usize, &u64)| {
         let order = model.elements[&head].nodes.len() - 1;
         let mut nodes = model.elements[&head].nodes.clone();
@@ -135,10 +200,14 @@ fn runs(model: &Model, section: &BeamSection, name: &str) -> Result<Vec<Run>, Im
             nodes.extend(&model.elements[&after].nodes[1..]);
             at = after;
         }
-        let name = if heads.len() == 1 { name.to_string() } else { format!("{name}_{}", k + 1) };
-        Ok(Run { axis3: axis3(model, section, &nodes)?, name, nodes, order })
+        let name = unique(&if heads.len() == 1 { name.clone() } else { format!("{name}_{}", k + 1) }, names);
+        Ok(Run { axis3: axis3(model, section, &nodes)?, name, nodes, line_load: line_load(model, head), order })
     };
     heads.iter().enumerate().map(run).collect()
+}
+
+fn line_load(model: &Model, element: u64) -> [f64; 3] {
+    model.line_loads.get(&element).copied().unwrap_or_default()
 }
 
 fn place(model: &Model, node: u64) -> Vec3 {
@@ -175,7 +244,13 @@ fn write_beam(text: &mut String, run: &Run, section: &str) {
     let _ = writeln!(text, "axis3 = {}\n", list(&run.axis3));
 }
 
-fn write_section(text: &mut String, model: &Model, section: &BeamSection, name: &str) -> Result<(), ImportError> {
+fn write_section(
+    text: &mut String,
+    model: &Model,
+    section: &BeamSection,
+    name: &str,
+    names: &Names,
+) -> Result<(), ImportError> {
     if !model.materials.contains_key(&section.material) {
         return Err(wrong(model, section.line, format!("there is no *MATERIAL {}", section.material)));
     }
@@ -195,8 +270,8 @@ fn write_section(text: &mut String, model: &Model, section: &BeamSection, name: 
             keys
         }
     };
-    let _ = writeln!(text, "[section.{name}] # {}, line {}", model.file, section.line);
-    let _ = writeln!(text, "material = \"{}\"\nshape = \"{}\"", plain(&section.material), keys[0].0);
+    let _ = writeln!(text, "[section.{name}] # {}, line {}", comment(&model.file), section.line);
+    let _ = writeln!(text, "material = \"{}\"\nshape = \"{}\"", names.materials[section.material.as_str()], keys[0].0);
     for (key, value) in &keys[1..] {
         let _ = writeln!(text, "{key} = {}", number(*value));
     }
@@ -207,7 +282,7 @@ fn write_section(text: &mut String, model: &Model, section: &BeamSection, name: 
     Ok(())
 }
 
-fn write_materials(text: &mut String, model: &Model) -> Result<(), ImportError> {
+fn write_materials(text: &mut String, model: &Model, names: &Names) -> Result<(), ImportError> {
     let used: BTreeMap<&str, &BeamSection> =
         model.sections.iter().map(|section| (section.material.as_str(), section)).collect();
     for (name, section) in used {
@@ -215,7 +290,7 @@ fn write_materials(text: &mut String, model: &Model) -> Result<(), ImportError> 
         let Some([young, poisson]) = material.elastic else {
             return Err(wrong(model, section.line, format!("the material {name} has no *ELASTIC")));
         };
-        let _ = writeln!(text, "[material.{}]\nE = {}\nnu = {}", plain(name), number(young), number(poisson));
+        let _ = writeln!(text, "[material.{}]\nE = {}\nnu = {}", names.materials[name], number(young), number(poisson));
         if let Some(density) = material.density {
             let _ = writeln!(text, "rho = {}", number(density));
         }
@@ -225,27 +300,35 @@ fn write_materials(text: &mut String, model: &Model) -> Result<(), ImportError> 
 }
 
 fn write_supports(text: &mut String, model: &Model, used: &BTreeSet<u64>) {
+    let mut all: BTreeMap<u64, BTreeSet<usize>> = BTreeMap::new();
     for (node, held) in model.held.iter().filter(|(node, _)| used.contains(node)) {
+        all.entry(*node).or_default().extend(&held.directions);
+    }
+    for element in model.elements.values().filter(|element| element.is_planar) {
+        for node in &element.nodes {
+            all.entry(*node).or_default().extend(OUT_OF_PLANE);
+        }
+    }
+    for (node, held) in all {
         let words: Vec<String> = held.iter().map(|&k| format!("\"{}\"", DIRECTIONS[k])).collect();
         let fix = if held.len() == 6 { "\"all\"".into() } else { format!("[{}]", words.join(", ")) };
         let _ = writeln!(text, "[[support]]\nat = \"n{node}\"\nfix = {fix}\n");
     }
 }
 
-fn write_loads(text: &mut String, model: &Model, used: &BTreeSet<u64>, of_set: &BTreeMap<&str, Vec<String>>) {
-    for (node, load) in model.loads.iter().filter(|(node, _)| used.contains(node)) {
+fn write_loads(text: &mut String, model: &Model, used: &BTreeSet<u64>, runs: &[Run]) {
+    let is_load = |load: &NodeLoad| load.vector != [0.0; 6];
+    for (node, load) in model.loads.iter().filter(|(node, load)| used.contains(node) && is_load(load)) {
         let _ = writeln!(text, "[[load]]\nat = \"n{node}\"");
-        for (name, vector) in [("force", &load[..3]), ("moment", &load[3..])] {
+        for (name, vector) in [("force", &load.vector[..3]), ("moment", &load.vector[3..])] {
             if vector.iter().any(|&x| x != 0.0) {
                 let _ = writeln!(text, "{name} = {}", list(vector));
             }
         }
         *text += "\n";
     }
-    for (set, force) in &model.line_loads {
-        for beam in of_set.get(set.as_str()).into_iter().flatten() {
-            let _ = writeln!(text, "[[load]]\nalong = \"{beam}\"\nforce = {}\n", list(force));
-        }
+    for run in runs.iter().filter(|run| run.line_load != [0.0; 3]) {
+        let _ = writeln!(text, "[[load]]\nalong = \"{}\"\nforce = {}\n", run.name, list(&run.line_load));
     }
 }
 

@@ -45,10 +45,8 @@ pub struct Blade {
     pub primary: String,
     /// Name of the blade file
     pub file: String,
-    /// Key points from root to tip, and the line of the first one
+    /// Key points from root to tip
     pub key_points: Vec<KeyPoint>,
-    /// Line of the first key point, from 1
-    pub key_line: usize,
     /// Numbers of the key points at which members end
     pub member_ends: Vec<usize>,
     /// Stations from 0 to 1
@@ -57,7 +55,7 @@ pub struct Blade {
     pub mu: Option<[f64; 6]>,
     /// Spectral radius of the time integration
     pub rho_inf: f64,
-    /// What was not imported
+    /// Messages about parts of the files that are left out
     pub notes: Vec<String>,
 }
 
@@ -76,12 +74,12 @@ pub struct Driver {
     pub tip: [f64; 6],
     /// Fractions of the length, with force and moment there
     pub points: Vec<(f64, [f64; 6])>,
-    /// What was not imported
+    /// Messages about parts of the files that are left out
     pub notes: Vec<String>,
 }
 
-/// Reads a primary file, and the blade file that `open` gives for the name in it: its own name and
-/// its text.
+/// Reads a primary file, and the blade file that it names: `open` gives the path and the text of
+/// that one.
 pub fn read_blade(
     name: &str,
     text: &str,
@@ -101,20 +99,31 @@ pub fn read_blade(
     let (file, blade_text) = open(word.text).map_err(|why| lines.error(line, word.column, why))?;
     let blade_lines = Lines::new(&file, &blade_text);
     let mut notes = Vec::new();
+    if lines.find("UsePitchAct").is_some() && lines.flag("UsePitchAct")? {
+        notes.push("the pitch actuator (UsePitchAct) is not imported: the root is clamped".into());
+    }
     let mu = read_damping(&blade_lines, &mut notes)?;
     let stations = read_stations(&blade_lines)?;
     Ok(Blade {
         title: lines.line(1).trim().to_string(),
         primary: name.into(),
         key_points,
-        key_line: first + 1,
         member_ends,
         stations,
         mu,
-        rho_inf: lines.number_or("rhoinf", 0.0)?.clamp(0.0, 1.0),
+        rho_inf: read_rho_inf(&lines)?,
         notes,
         file: file.clone(),
     })
+}
+
+fn read_rho_inf(lines: &Lines) -> Result<f64, ImportError> {
+    let rho_inf = lines.number_or("rhoinf", 0.0)?;
+    if !(0.0..=1.0).contains(&rho_inf) {
+        let (line, word) = lines.value("rhoinf")?;
+        return Err(lines.error(line, word.column, format!("`rhoinf` must be from 0 to 1, found {rho_inf}")));
+    }
+    Ok(rho_inf)
 }
 
 /// The key points at which members end, and the line of the first key point.
@@ -310,7 +319,7 @@ pub fn read_driver(name: &str, text: &str) -> Result<Driver, ImportError> {
 
 /// Refuses a matrix of direction cosines below `GlbPos` that is not the identity.
 fn refuse_turned_frame(lines: &Lines) -> Result<(), ImportError> {
-    let Some(position) = lines.find("GlbPos(3)") else { return Ok(()) };
+    let (position, _) = lines.value("GlbPos(3)")?;
     let mut at = position + 1;
     // Lines of text stand above the matrix.
     while at < lines.count() && lines.row::<3>(at, "").is_err() && at < position + 4 {

@@ -1,14 +1,20 @@
 //! The deck of a blade of BeamDyn.
 
-use super::beamdyn::{Blade, BladeStation, Driver};
-use super::deck_text::{Imported, list, number, quoted, wrapped};
+use super::beamdyn::{Blade, BladeStation, Driver, KeyPoint};
+use super::deck_text::{Imported, comment, list, number, quoted, wrapped};
 use crate::scene::{NaturalSpline, Spline};
 use beamsim_core::tensor::Vec3;
 use nalgebra::Matrix6;
+use std::f64::consts::PI;
 use std::fmt::Write;
+use std::ops::Range;
 
 /// Fractions of the length that are one place.
 const ONE_PLACE: f64 = 1e-6;
+
+/// Distance of a key point from a station, over the length, that needs no station of its own: the
+/// twist at the station is that of the spline.
+const KEY_AT_STATION: f64 = 1e-4;
 
 /// The longest element over the length of the blade.
 const LONGEST_ELEMENT: f64 = 1.0 / 16.0;
@@ -20,15 +26,19 @@ const SAMPLES: usize = 4;
 /// The deck of a blade that is clamped at its root: with the loads of a driver, or with its modes.
 pub fn beamdyn_deck(blade: &Blade, driver: Option<&Driver>) -> Imported {
     let axis = Axis::new(blade);
-    let stations = stations(blade, &axis, driver);
+    let places = places(blade, &axis, driver);
     let mut text = String::new();
     let notes: Vec<String> =
         blade.notes.iter().chain(driver.into_iter().flat_map(|driver| &driver.notes)).cloned().collect();
     head(&mut text, blade, driver, &notes);
-    for (number, station) in stations.iter().enumerate() {
-        section(&mut text, &section_name(number, stations.len()), station);
+    joints(&mut text, &axis);
+    for (number, &place) in places.iter().enumerate() {
+        section(&mut text, &section_name(number, places.len()), &station(blade, place));
     }
-    beam(&mut text, &axis, &stations, &element_ends(blade, driver));
+    for number in 0..axis.members.len() {
+        beam(&mut text, &axis, number, &places);
+    }
+    let _ = writeln!(text, "[[support]]\nat = \"{}@start\"\nfix = \"all\"\n", axis.beam_name(0));
     if let Some(mu) = blade.mu {
         let _ = writeln!(
             text,
@@ -38,7 +48,7 @@ pub fn beamdyn_deck(blade: &Blade, driver: Option<&Driver>) -> Imported {
         );
     }
     match driver {
-        Some(driver) => loads(&mut text, blade, driver),
+        Some(driver) => loads(&mut text, blade, driver, &axis, &places),
         None => {
             text += "# The modes of the clamped blade. With a driver file there are its loads instead.\n[[stage]]\nkind = \"modal\"\nmodes = 10\n"
         }
@@ -46,63 +56,81 @@ pub fn beamdyn_deck(blade: &Blade, driver: Option<&Driver>) -> Imported {
     Imported { deck: text, notes }
 }
 
-/// The reference axis of a blade.
+/// The reference axis of a blade: a beam for each member.
 struct Axis {
-    /// Natural splines of x, y and twist over z, one for each member, with the z of its end
-    members: Vec<(NaturalSpline, f64)>,
-    /// Points from root to tip: two if it is straight
-    points: Vec<Vec3>,
-    line: Spline,
+    members: Vec<Member>,
     length: f64,
 }
 
-impl Axis {
-    fn new(blade: &Blade) -> Self {
-        let z = |k: usize| blade.key_points[k].place[2];
-        let member = |ends: &[usize]| {
-            let keys = &blade.key_points[ends[0]..=ends[1]];
-            let values: Vec<Vec3> = keys.iter().map(|key| Vec3([key.place[0], key.place[1], key.twist])).collect();
-            let parameters: Vec<f64> = keys.iter().map(|key| key.place[2]).collect();
-            (NaturalSpline::new(&values, &parameters), parameters[parameters.len() - 1])
+/// The line of a member, with a natural spline of its own.
+struct Member {
+    /// x, y and twist over z
+    over_z: NaturalSpline,
+    /// Points from its start to its end: two if it is straight
+    points: Vec<Vec3>,
+    line: Spline,
+    /// Arc lengths from its start to its key points
+    keys: Vec<f64>,
+    /// Fraction of the length of the blade at its start
+    start: f64,
+    /// Fraction of the length of the blade at its end
+    end: f64,
+}
+
+impl Member {
+    fn new(keys: &[KeyPoint]) -> Self {
+        let values: Vec<Vec3> = keys.iter().map(|key| Vec3([key.place[0], key.place[1], key.twist])).collect();
+        let z: Vec<f64> = keys.iter().map(|key| key.place[2]).collect();
+        let over_z = NaturalSpline::new(&values, &z);
+        let last = keys.len() - 1;
+        let is_straight = keys.iter().all(|key| key.place[..2] == keys[0].place[..2]);
+        let sample = |k: usize| {
+            let [key, part] = [k / SAMPLES, k % SAMPLES];
+            if part == 0 {
+                return Vec3(keys[key].place);
+            }
+            let height = z[key] + part as f64 / SAMPLES as f64 * (z[key + 1] - z[key]);
+            let Vec3([x, y, _]) = over_z.at(height);
+            Vec3([x, y, height])
         };
-        let members: Vec<_> = blade.member_ends.windows(2).map(member).collect();
-        let last = blade.key_points.len() - 1;
-        let place = |z: f64| {
-            let Vec3([x, y, _]) = value_at(&members, z);
-            Vec3([x, y, z])
-        };
-        let first = Vec3(blade.key_points[0].place);
-        let is_straight = blade.key_points.iter().all(|key| key.place[..2] == first.0[..2]);
-        let points: Vec<Vec3> = if is_straight {
-            vec![first, Vec3(blade.key_points[last].place)]
-        } else {
-            let sample = |k: usize| {
-                let part = (k % SAMPLES) as f64 / SAMPLES as f64;
-                let from = z(k / SAMPLES);
-                place(if k.is_multiple_of(SAMPLES) { from } else { from + part * (z(k / SAMPLES + 1) - from) })
-            };
-            (0..=SAMPLES * last).map(sample).collect()
+        let points: Vec<Vec3> = match is_straight {
+            true => vec![Vec3(keys[0].place), Vec3(keys[last].place)],
+            false => (0..=SAMPLES * last).map(sample).collect(),
         };
         let line = Spline::new(&points, None);
-        let length = line.length_to(points.len() - 1);
-        Self { members, points, line, length }
+        let length_to = |k: usize| if is_straight { z[k] - z[0] } else { line.length_to(SAMPLES * k) };
+        let keys = (0..=last).map(length_to).collect();
+        Self { over_z, points, line, keys, start: 0.0, end: 1.0 }
     }
 
-    /// The fraction of the length of a key point.
-    fn fraction_of_key(&self, number: usize, z: f64) -> f64 {
-        if self.points.len() == 2 {
-            return (z - self.points[0].0[2]) / self.length;
+    fn length(&self) -> f64 {
+        self.keys[self.keys.len() - 1]
+    }
+
+    /// The fraction of its length at a fraction of the length of the blade.
+    fn own(&self, place: f64) -> f64 {
+        if place <= self.start + 2.0 * ONE_PLACE {
+            0.0
+        } else if place >= self.end - 2.0 * ONE_PLACE {
+            1.0
+        } else {
+            (place - self.start) / (self.end - self.start)
         }
-        self.line.length_to(SAMPLES * number) / self.length
     }
 
-    /// The angle of the section axes about the tangent at a fraction of the length, against axes
-    /// whose third one is the part of y normal to the tangent. BeamDyn turns x by the twist about -z
-    /// in the plane of x and y, and then along the tangent into the section.
-    fn angle(&self, fraction: f64) -> f64 {
-        let tangent = self.line.tangent(fraction * self.length);
-        let z = self.line.place(fraction * self.length).0[2];
-        let twist = -value_at(&self.members, z).0[2];
+    /// The numbers of those of these places, which increase, that lie on it.
+    fn range(&self, places: &[f64]) -> Range<usize> {
+        let first = places.partition_point(|place| *place < self.start - 2.0 * ONE_PLACE);
+        first..places.partition_point(|place| *place <= self.end + 2.0 * ONE_PLACE)
+    }
+
+    /// The angle of the section axes about the tangent at a fraction of its length, against axes
+    /// whose third one is the part of y normal to the tangent. BeamDyn turns x by the twist about
+    /// -z in the plane of x and y, and then along the tangent into the section.
+    fn angle(&self, own: f64) -> f64 {
+        let tangent = self.line.tangent(own * self.length());
+        let z = self.line.place(own * self.length()).0[2];
+        let twist = -self.over_z.at(z).0[2];
         let (sin, cos) = libm::sincos(twist);
         let Vec3([t1, t2, t3]) = tangent;
         let across = Vec3([t3 * cos, t3 * sin, -(t1 * cos + t2 * sin)]);
@@ -113,38 +141,86 @@ impl Axis {
     }
 }
 
-/// x, y and twist at a height z.
-fn value_at(members: &[(NaturalSpline, f64)], z: f64) -> Vec3 {
-    let found = members.iter().find(|(_, end)| z <= *end).or(members.last());
-    found.map_or(Vec3::ZERO, |(spline, _)| spline.at(z))
+impl Axis {
+    fn new(blade: &Blade) -> Self {
+        let member = |ends: &[usize]| Member::new(&blade.key_points[ends[0]..=ends[1]]);
+        let mut members: Vec<Member> = blade.member_ends.windows(2).map(member).collect();
+        let length: f64 = members.iter().map(Member::length).sum();
+        let mut before = 0.0;
+        let last = members.len() - 1;
+        for (number, member) in members.iter_mut().enumerate() {
+            member.start = before / length;
+            before += member.length();
+            member.end = if number == last { 1.0 } else { before / length };
+        }
+        Self { members, length }
+    }
+
+    fn beam_name(&self, member: usize) -> String {
+        if self.members.len() == 1 { "blade".into() } else { format!("blade_{}", member + 1) }
+    }
+
+    /// A place of the deck at a fraction of the length of the blade.
+    fn place_name(&self, place: f64) -> String {
+        let last = self.members.len() - 1;
+        let member = self.members.partition_point(|member| member.end + 2.0 * ONE_PLACE < place).min(last);
+        format!("{}@{}", self.beam_name(member), number(self.members[member].own(place)))
+    }
+
+    /// Fractions of the length of the blade at which stations of its sections stand for key points.
+    fn key_places(&self) -> impl Iterator<Item = f64> {
+        self.members.iter().flat_map(|member| member.keys.iter().map(|key| member.start + key / self.length))
+    }
+}
+
+/// Angles that go on from one to the next, without jumps of a whole turn.
+fn continue_turns(angles: &mut [f64]) {
+    for k in 1..angles.len() {
+        angles[k] += 2.0 * PI * ((angles[k - 1] - angles[k]) / (2.0 * PI)).round();
+    }
 }
 
 /// A station of the deck: one of the blade file, or between two of them.
 struct Station {
     fraction: f64,
-    angle: f64,
     stiffness: Matrix6<f64>,
     mass: Matrix6<f64>,
     source: String,
 }
 
-/// The stations of the blade file, those of key points, between which the twist varies, and those
-/// of point loads.
-fn stations(blade: &Blade, axis: &Axis, driver: Option<&Driver>) -> Vec<Station> {
-    let own = blade.stations.iter().map(|station| station.eta);
-    let keys = blade.key_points.iter().enumerate().map(|(k, key)| axis.fraction_of_key(k, key.place[2]));
+/// Fractions of the length at which the deck has stations and elements end: the stations of the
+/// blade file, ends of members, key points, between which the twist varies, and point loads.
+fn places(blade: &Blade, axis: &Axis, driver: Option<&Driver>) -> Vec<f64> {
+    let own: Vec<f64> = blade.stations.iter().map(|station| station.eta).collect();
+    let is_away = |place: &f64| {
+        let next = own.partition_point(|eta| eta < place);
+        own[next.saturating_sub(1)..own.len().min(next + 1)].iter().all(|eta| (eta - place).abs() > KEY_AT_STATION)
+    };
+    let keys = axis.key_places().filter(is_away);
+    let ends = axis.members.iter().map(|member| member.end);
     let loads = driver.into_iter().flat_map(|driver| driver.points.iter().map(|(eta, _)| *eta));
-    let mut places: Vec<f64> = own.collect();
-    for place in keys.chain(loads) {
-        if places.iter().all(|known| (known - place).abs() > ONE_PLACE) {
-            places.push(place);
+    let others = keys.chain(ends).chain(loads).map(|place| (place, false));
+    let mut all: Vec<(f64, bool)> = own.iter().map(|&eta| (eta, true)).chain(others).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut kept: Vec<(f64, bool)> = Vec::new();
+    for (place, is_own) in all {
+        match kept.last_mut() {
+            Some(before) if place - before.0 <= ONE_PLACE && !is_own => {}
+            Some(before) if place - before.0 <= ONE_PLACE && !before.1 => *before = (place, is_own),
+            Some(_) | None => kept.push((place, is_own)),
         }
     }
-    places.sort_by(f64::total_cmp);
-    places.into_iter().map(|place| station(blade, axis, place)).collect()
+    kept.into_iter().map(|(place, _)| place).collect()
 }
 
-fn station(blade: &Blade, axis: &Axis, fraction: f64) -> Station {
+/// The one of these places, which increase, that is next to a place.
+fn nearest(places: &[f64], place: f64) -> f64 {
+    let next = places.partition_point(|&known| known < place).clamp(1, places.len() - 1);
+    let [before, after] = [places[next - 1], places[next]];
+    if place - before <= after - place { before } else { after }
+}
+
+fn station(blade: &Blade, fraction: f64) -> Station {
     let next = blade.stations.partition_point(|station| station.eta <= fraction).clamp(1, blade.stations.len() - 1);
     let [from, to]: [&BladeStation; 2] = [&blade.stations[next - 1], &blade.stations[next]];
     let part = (fraction - from.eta) / (to.eta - from.eta);
@@ -158,7 +234,6 @@ fn station(blade: &Blade, axis: &Axis, fraction: f64) -> Station {
     };
     Station {
         fraction,
-        angle: axis.angle(fraction),
         stiffness: between(&from.stiffness, &to.stiffness),
         mass: between(&from.mass, &to.mass),
         source,
@@ -167,14 +242,19 @@ fn station(blade: &Blade, axis: &Axis, fraction: f64) -> Station {
 
 fn head(text: &mut String, blade: &Blade, driver: Option<&Driver>, notes: &[String]) {
     let _ = writeln!(text, "#:schema beamsim.schema.json");
-    let _ = writeln!(text, "# From files of BeamDyn: {} (key points), {} (sections)", blade.primary, blade.file);
+    let _ = writeln!(
+        text,
+        "# From files of BeamDyn: {} (key points), {} (sections)",
+        comment(&blade.primary),
+        comment(&blade.file)
+    );
     if let Some(driver) = driver {
-        let _ = writeln!(text, "# and {} (loads)", driver.file);
+        let _ = writeln!(text, "# and {} (loads)", comment(&driver.file));
     }
     *text += "#\n# Global axes are those of the root frame of the blade. Local axes 1, 2, 3 are z, x, y of its sections, so that\n\
               # rows x y z x y z of its matrices are rows 2 3 1 2 3 1 here. The twist of BeamDyn is about -z.\n";
     for note in notes {
-        let _ = writeln!(text, "# {note}");
+        let _ = writeln!(text, "# {}", comment(note));
     }
     let _ = writeln!(text, "title = {}", quoted(&blade.title));
     *text += "units = { length = \"m\", force = \"N\", time = \"s\" }\n";
@@ -190,54 +270,73 @@ fn section_name(number: usize, count: usize) -> String {
 }
 
 fn section(text: &mut String, name: &str, station: &Station) {
-    let _ = writeln!(text, "[section.{name}] # at {}: {}", number(station.fraction), station.source);
+    let _ = writeln!(text, "[section.{name}] # at {}: {}", number(station.fraction), comment(&station.source));
     let _ = writeln!(text, "stiffness = {}", rows(&station.stiffness));
     let _ = writeln!(text, "mass = {}\n", rows(&station.mass));
 }
 
-/// Places where elements end, without those of the blade: stations of the blade file, between which
-/// matrices are linear, point loads, and equal parts of what is long.
-fn element_ends(blade: &Blade, driver: Option<&Driver>) -> Vec<f64> {
-    let loads = driver.into_iter().flat_map(|driver| driver.points.iter().map(|(eta, _)| *eta));
-    let mut ends: Vec<f64> = blade.stations.iter().map(|station| station.eta).collect();
-    for place in loads {
-        if ends.iter().all(|known| (known - place).abs() > ONE_PLACE) {
-            ends.push(place);
-        }
+/// Points at which members meet.
+fn joints(text: &mut String, axis: &Axis) {
+    if axis.members.len() == 1 {
+        return;
     }
-    ends.sort_by(f64::total_cmp);
+    *text += "# Members of the blade are beams, which meet at these points.\n[point]\n";
+    for (number, member) in axis.members.iter().enumerate().skip(1) {
+        let _ = writeln!(text, "member_{} = {}", number + 1, list(&member.points[0].0));
+    }
+    *text += "\n";
+}
+
+/// Places where the elements of a member end, without its own: its stations, and equal parts of
+/// what is long.
+fn element_ends(stations: &[f64], longest: f64) -> Vec<f64> {
     let parts = |pair: &[f64]| {
         let [from, to] = [pair[0], pair[1]];
-        let count = ((to - from) / LONGEST_ELEMENT).ceil().max(1.0) as usize;
+        let count = ((to - from) / longest).ceil().max(1.0) as usize;
         (1..=count).map(|k| if k == count { to } else { from + (to - from) * k as f64 / count as f64 }).collect()
     };
-    let mut all: Vec<f64> = ends.windows(2).flat_map::<Vec<f64>, _>(parts).collect();
+    let mut all: Vec<f64> = stations.windows(2).flat_map::<Vec<f64>, _>(parts).collect();
     all.pop();
     all
 }
 
-fn beam(text: &mut String, axis: &Axis, stations: &[Station], ends: &[f64]) {
-    let names: Vec<String> = (0..stations.len()).map(|k| format!("\"{}\"", section_name(k, stations.len()))).collect();
-    let fractions: Vec<f64> = stations.iter().map(|station| station.fraction).collect();
-    let angles: Vec<f64> = stations.iter().map(|station| station.angle).collect();
-    let points: Vec<String> = axis.points.iter().map(|point| list(&point.0)).collect();
+fn beam(text: &mut String, axis: &Axis, number: usize, places: &[f64]) {
+    let member = &axis.members[number];
+    let mut stations: Vec<(usize, f64)> = member.range(places).map(|k| (k, member.own(places[k]))).collect();
+    stations.dedup_by_key(|station| station.1);
+    let names: Vec<String> = stations.iter().map(|(k, _)| format!("\"{}\"", section_name(*k, places.len()))).collect();
+    let fractions: Vec<f64> = stations.iter().map(|(_, own)| *own).collect();
+    let mut angles: Vec<f64> = fractions.iter().map(|own| member.angle(*own)).collect();
+    continue_turns(&mut angles);
+    let mut points: Vec<String> = member.points.iter().map(|point| list(&point.0)).collect();
+    if number > 0 {
+        points[0] = format!("\"member_{}\"", number + 1);
+    }
+    if let Some(point) = points.last_mut().filter(|_| number + 1 < axis.members.len()) {
+        *point = format!("\"member_{}\"", number + 2);
+    }
     let line = if points.len() == 2 { "through" } else { "spline" };
-    let _ = writeln!(text, "[[beam]]\nname = \"blade\"");
+    let _ = writeln!(text, "[[beam]]\nname = \"{}\"", axis.beam_name(number));
     let _ = writeln!(text, "section = {}", wrapped(&names));
     let _ = writeln!(text, "stations = {}", list(&fractions));
     let _ = writeln!(text, "stations_in = \"fraction\"");
     let _ = writeln!(text, "twist = {} # rad, about axis 1", list(&angles));
     let _ = writeln!(text, "{line} = {}", wrapped(&points));
     *text += "axis3 = [0, 1, 0]\n";
-    let _ = writeln!(text, "elements = [{}] # they end at the stations of the file", list(ends));
-    *text += "order = 2\n\n[[support]]\nat = \"blade@start\"\nfix = \"all\"\n\n";
+    let ends = element_ends(&fractions, LONGEST_ELEMENT / (member.end - member.start));
+    let _ = match ends.is_empty() {
+        true => writeln!(text, "elements = 1"),
+        false => writeln!(text, "elements = [{}] # they end at the stations", list(&ends)),
+    };
+    *text += "order = 2\n\n";
 }
 
-fn loads(text: &mut String, blade: &Blade, driver: &Driver) {
-    let along = ("along", "blade".to_string(), driver.along);
-    let tip = ("at", "blade@end".to_string(), driver.tip);
-    let points = driver.points.iter().map(|(eta, load)| ("at", format!("blade@{}", number(*eta)), *load));
-    for (key, place, load) in [along, tip].into_iter().chain(points) {
+fn loads(text: &mut String, blade: &Blade, driver: &Driver, axis: &Axis, places: &[f64]) {
+    let last = axis.beam_name(axis.members.len() - 1);
+    let along = (0..axis.members.len()).map(|number| ("along", axis.beam_name(number), driver.along));
+    let tip = ("at", format!("{last}@end"), driver.tip);
+    let points = driver.points.iter().map(|(eta, load)| ("at", axis.place_name(nearest(places, *eta)), *load));
+    for (key, place, load) in along.chain([tip]).chain(points) {
         let [force, moment] = [&load[..3], &load[3..]];
         if load == [0.0; 6] {
             continue;
@@ -262,7 +361,7 @@ fn loads(text: &mut String, blade: &Blade, driver: &Driver) {
             );
         }
     }
-    *text += "\n[output]\nnodes = [\"blade@end\"]\ncolumns = [\"u\", \"r\"]\n";
+    let _ = writeln!(text, "\n[output]\nnodes = [\"{last}@end\"]\ncolumns = [\"u\", \"r\"]");
 }
 
 fn rows(matrix: &Matrix6<f64>) -> String {

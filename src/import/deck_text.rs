@@ -8,10 +8,14 @@ pub struct Imported {
     pub notes: Vec<String>,
 }
 
-/// A text as TOML: without what could end it.
+/// A text as it may stand in a comment: on one line, without control characters.
+pub fn comment(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).collect()
+}
+
+/// A text as a string of TOML.
 pub fn quoted(text: &str) -> String {
-    let plain: String = text.chars().filter(|c| !c.is_control()).collect();
-    format!("\"{}\"", plain.replace('\\', "\\\\").replace('"', "\\\""))
+    format!("\"{}\"", comment(text).replace('\\', "\\\\").replace('"', "\\\""))
 }
 
 /// A number that reads back to the last bit.

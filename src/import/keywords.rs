@@ -3,14 +3,26 @@
 
 use super::lines::{ImportError, Lines, Word, shown};
 
+/// A parameter of a keyword.
+pub struct Parameter<'t> {
+    /// In capitals, without spaces
+    pub name: String,
+    /// Line in the file, from 0
+    pub line: usize,
+    /// Column of its name, from 1
+    pub column: usize,
+    /// Without quotes; empty if it has none
+    pub value: Word<'t>,
+}
+
 /// A keyword with its data.
 pub struct Block<'t> {
     /// In capitals, without spaces: `BEAMSECTION`
     pub name: String,
     /// Line of the keyword, from 0
     pub line: usize,
-    /// Names in capitals, and values
-    pub parameters: Vec<(String, Word<'t>)>,
+    /// Its parameters, in order
+    pub parameters: Vec<Parameter<'t>>,
     /// Lines of data, from 0, that are not empty
     pub data: Vec<usize>,
 }
@@ -18,7 +30,7 @@ pub struct Block<'t> {
 impl<'t> Block<'t> {
     /// The value of a parameter.
     pub fn get(&self, name: &str) -> Option<Word<'t>> {
-        self.parameters.iter().find(|(known, _)| known == name).map(|(_, word)| *word)
+        self.parameters.iter().find(|known| known.name == name).map(|known| known.value)
     }
 
     /// True if it has a parameter, with a value or without.
@@ -48,11 +60,11 @@ pub fn blocks<'t>(lines: &Lines<'t>) -> Result<Vec<Block<'t>>, ImportError> {
             let mut fields = lines.fields(number).into_iter();
             let _ = fields.next();
             let name: String = keyword.split(',').next().unwrap_or("").split_whitespace().collect();
-            let parameters = fields.filter_map(parameter).collect();
+            let parameters = fields.filter_map(|word| parameter(number, word)).collect();
             blocks.push(Block { name: name.to_uppercase(), line: number, parameters, data: Vec::new() });
         } else if let Some(block) = blocks.last_mut() {
             if continues {
-                block.parameters.extend(lines.fields(number).into_iter().filter_map(parameter));
+                block.parameters.extend(lines.fields(number).into_iter().filter_map(|word| parameter(number, word)));
             } else {
                 block.data.push(number);
             }
@@ -65,14 +77,27 @@ pub fn blocks<'t>(lines: &Lines<'t>) -> Result<Vec<Block<'t>>, ImportError> {
     Ok(blocks)
 }
 
-fn parameter(word: Word) -> Option<(String, Word)> {
+fn parameter(line: usize, word: Word) -> Option<Parameter> {
     if word.text.is_empty() {
         return None;
     }
     let (name, value) = word.text.split_once('=').unwrap_or((word.text, ""));
     let name: String = name.split_whitespace().collect();
-    let skipped = word.text.len() - value.trim_start().len();
-    Some((name.to_uppercase(), Word { text: value.trim(), column: word.column + skipped }))
+    let skipped = word.text[..word.text.len() - value.trim_start().len()].chars().count();
+    let value = Word { text: unquoted(value.trim()), column: word.column + skipped };
+    Some(Parameter { name: name.to_uppercase(), line, column: word.column, value })
+}
+
+fn unquoted(text: &str) -> &str {
+    text.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).unwrap_or(text)
+}
+
+/// The name of a set in a line of data, in capitals; without that of a part or an instance before a
+/// point: `beam-1.tip`.
+pub fn set_name(word: Word) -> String {
+    let own = if word.text.ends_with('"') { word.text } else { word.text.rsplit('.').next().unwrap_or(word.text) };
+    let quoted = own.rfind(".\"").map_or(own, |point| &own[point + 1..]);
+    unquoted(quoted).to_uppercase()
 }
 
 /// A positive whole number.

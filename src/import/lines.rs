@@ -6,14 +6,14 @@ use std::fmt;
 /// Characters of a word in a message, at most.
 const LONGEST: usize = 40;
 
-/// What is wrong in a file, and where.
+/// An error in a file, with its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImportError {
     /// Name of the file
     pub file: String,
     /// Line and column from 1; `None` for the whole file
     pub at: Option<[usize; 2]>,
-    /// What is wrong
+    /// The fault, in a sentence
     pub message: String,
 }
 

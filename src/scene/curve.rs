@@ -105,11 +105,6 @@ impl Spline {
         derivative * (1.0 / derivative.norm())
     }
 
-    /// The number of segments between two points.
-    pub fn segments(&self) -> usize {
-        self.segments.len()
-    }
-
     /// The smallest speed over the parameter, whose mean is about 1: it vanishes at cusps.
     pub fn slowest(&self) -> f64 {
         let at = |segment: &Segment, step: usize| {

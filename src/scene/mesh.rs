@@ -362,6 +362,7 @@ impl Mesh {
             let message = format!("`{key}` has {counts} entries, beam `{}` has {pieces} piece(s)", beam.name.value);
             return Err(Diagnostic::error(message, span.clone()));
         }
+        path::refuse_coarse(beam, &line)?;
         Ok((line, section.forced(&deck.effects)))
     }
 

@@ -13,6 +13,14 @@ const TANGENTS: f64 = 720.0;
 /// Places of a curve at which the tangent is compared with `axis3`, at most.
 const MOST_TANGENTS: f64 = 1e5;
 
+/// Angle that the tangent turns by along an element of order 1, at most, rad: elements of order 2
+/// and 3 may turn by twice and three times as much.
+const MOST_TURN: f64 = 60.0 * PI / 180.0;
+
+/// Steps in which the turn of the tangent is measured along an element, a turn of a helix, or a
+/// segment of a spline.
+const TURN_STEPS: f64 = 8.0;
+
 /// Least speed of a spline over the sum of its chords: less is a cusp.
 const SLOWEST: f64 = 1e-3;
 
@@ -42,10 +50,11 @@ enum Curve {
         angle: f64,
     },
     Helix(Helix),
-    /// Arc length from `from` on
+    /// Arc length from `from` on, over some segments between points
     Spline {
         spline: Arc<Spline>,
         from: f64,
+        segments: usize,
     },
 }
 
@@ -123,7 +132,7 @@ impl Piece {
                 *centre + (*e * libm::cos(a) + *f * libm::sin(a)) * *radius
             }
             Curve::Helix(helix) => helix.place(t),
-            Curve::Spline { spline, from } => spline.place(from + t * self.length),
+            Curve::Spline { spline, from, .. } => spline.place(from + t * self.length),
         }
     }
 
@@ -136,7 +145,17 @@ impl Piece {
                 *f * libm::cos(a) - *e * libm::sin(a)
             }
             Curve::Helix(helix) => helix.tangent(t),
-            Curve::Spline { spline, from } => spline.tangent(from + t * self.length),
+            Curve::Spline { spline, from, .. } => spline.tangent(from + t * self.length),
+        }
+    }
+
+    /// Turns of a helix, segments of a spline, else 1: parts in which the tangent has no more than
+    /// about one turn.
+    fn windings(&self) -> f64 {
+        match &self.curve {
+            Curve::Line | Curve::Arc { .. } => 1.0,
+            Curve::Helix(helix) => helix.turns(),
+            Curve::Spline { segments, .. } => *segments as f64,
         }
     }
 
@@ -272,6 +291,44 @@ pub fn centre_line(
     Ok(CentreLine::new(pieces, along(beam, beam.twist.as_ref())))
 }
 
+/// Refuses elements so long that nodes on a helix or spline lose its shape: a turn of one element
+/// would be straight.
+pub fn refuse_coarse(beam: &deck::Beam, line: &CentreLine) -> Result<(), Diagnostic> {
+    for (number, piece) in line.pieces.iter().enumerate() {
+        let kind = match piece.curve {
+            Curve::Line | Curve::Arc { .. } => continue,
+            Curve::Helix(_) => "helix",
+            Curve::Spline { .. } => "spline",
+        };
+        let division = beam.elements_of(number);
+        let most = MOST_TURN * beam.order as f64;
+        let is_coarse = |part: &usize| turn(piece, [division.end(*part), division.end(part + 1)]) > most * (1.0 + 1e-6);
+        if let Some(part) = (0..division.count()).find(is_coarse) {
+            let degrees = turn(piece, [division.end(part), division.end(part + 1)]).to_degrees().round();
+            let most = most.to_degrees().round();
+            let message = format!(
+                "element {} of the {kind} of beam `{}` turns by {degrees}°; elements of order {} may turn by {most}°",
+                part + 1,
+                beam.name.value,
+                beam.order
+            );
+            return Err(Diagnostic::error(message, beam.elements.span.clone()).help("use more `elements`"));
+        }
+    }
+    Ok(())
+}
+
+/// The angle by which the tangent turns between two fractions of a piece.
+fn turn(piece: &Piece, [start, end]: [f64; 2]) -> f64 {
+    let steps = (TURN_STEPS * (piece.windings() * (end - start)).ceil().max(1.0)).min(MOST_TANGENTS);
+    let tangent = |k: usize| piece.tangent(start + (end - start) * (k as f64 / steps));
+    let between = |k: usize| {
+        let [a, b] = [tangent(k), tangent(k + 1)];
+        libm::atan2(a.cross(b).norm(), a.dot(b))
+    };
+    (0..steps as usize).map(between).sum()
+}
+
 /// Numbers that a beam gives at its start and its end, or at its stations; zero where it gives none.
 pub fn along<const N: usize>(beam: &deck::Beam, values: Option<&Spanned<Vec<[f64; N]>>>) -> Along<N> {
     let Some(values) = values else { return Along::zero() };
@@ -394,7 +451,7 @@ fn spline(
         let piece = Piece {
             start: places[ends[0]],
             end: places[ends[1]],
-            curve: Curve::Spline { spline: spline.clone(), from },
+            curve: Curve::Spline { spline: spline.clone(), from, segments: ends[1] - ends[0] },
             length,
             axis3: axis3.map_or(Vec3::UNIT[2], |axis| axis.value),
         };
@@ -408,12 +465,7 @@ fn spline(
 /// any arc.
 fn refuse_parallel(beam: &deck::Beam, piece: &Piece, span: &Span) -> Result<(), Diagnostic> {
     let axis = piece.axis3;
-    let turns = match &piece.curve {
-        Curve::Line | Curve::Arc { .. } => 1.0,
-        Curve::Helix(helix) => helix.turns(),
-        Curve::Spline { spline, .. } => spline.segments() as f64,
-    };
-    let count = (TANGENTS * turns.max(1.0)).min(MOST_TANGENTS) as usize;
+    let count = (TANGENTS * piece.windings().max(1.0)).min(MOST_TANGENTS) as usize;
     let parallel = |k: usize| piece.tangent(k as f64 / count as f64).cross(axis).norm() <= 1e-2 * axis.norm();
     if !(0..=count).any(parallel) {
         return Ok(());

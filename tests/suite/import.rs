@@ -58,24 +58,109 @@ fn damping_and_matrices_are_in_the_order_of_sections() {
     assert!(first.find("18113600000.0").unwrap() < first.find("18110000000.0").unwrap(), "{first}");
 }
 
-/// A blade that bends and sweeps is a spline; point loads find nodes.
-#[test]
-fn curved_blades_are_splines() {
-    let primary = text("nrel_5mw.dat");
-    let mut curved = String::new();
-    for line in primary.lines() {
+/// The primary file with other key points: x, y and twist in degrees over z.
+fn with_keys(primary: &str, key: impl Fn(f64, f64) -> [f64; 3]) -> String {
+    let line = |line: &str| {
         let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
         match numbers[..] {
             [0.0, 0.0, z, twist] if line.contains('E') => {
-                let s = z / 61.5;
-                curved += &format!("{} {} {z} {twist}\n", -4.0 * s * s, 0.8 * s * s * s);
+                let [x, y, twist] = key(z, twist);
+                format!("{x} {y} {z} {twist}\n")
             }
-            _ => curved += &format!("{line}\n"),
+            _ => format!("{line}\n"),
+        }
+    };
+    primary.lines().map(line).collect()
+}
+
+/// The primary file of a blade that bends and sweeps.
+fn bent(primary: &str) -> String {
+    with_keys(primary, |z, twist| {
+        let s = z / 61.5;
+        [-4.0 * s * s, 0.8 * s * s * s, twist]
+    })
+}
+
+/// The driver file with a force of 500 N along y at a fraction of the length.
+fn point_load(eta: &str) -> String {
+    text("nrel_5mw_driver.dat").replace("0   NumPointLoads", "1   NumPointLoads").replace(
+        "(N-m)        (N-m)        (N-m)\n",
+        &format!("(N-m)        (N-m)        (N-m)\n{eta} 0 500 0 0 0 0\n"),
+    )
+}
+
+/// The numbers of a list of a deck.
+fn list_of(deck: &str, key: &str) -> Vec<f64> {
+    let begin = deck.find(&format!("\n{key} = [")).unwrap() + key.len() + 5;
+    let end = begin + deck[begin..].find(']').unwrap();
+    deck[begin..end].split(',').filter_map(|word| word.trim().parse().ok()).collect()
+}
+
+/// Angles go on where the twist passes half a turn.
+#[test]
+fn twist_goes_on_beyond_half_a_turn() {
+    let primary = with_keys(&text("nrel_5mw.dat"), |z, _| [0.0, 0.0, 170.0 + 40.0 * z / 61.5]);
+    let deck = nrel(&primary, &text("nrel_5mw_blade.dat"), None).unwrap();
+    let twist = list_of(&deck, "twist");
+    assert!(twist.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.2), "{twist:?}");
+    assert!((twist[twist.len() - 1] - twist[0] + 40.0_f64.to_radians()).abs() < 1e-9, "{twist:?}");
+}
+
+/// A point load beside a station acts at the station, which is a node.
+#[test]
+fn point_loads_beside_a_station_act_there() {
+    let blade = text("nrel_5mw_blade.dat");
+    let deck = nrel(&text("nrel_5mw.dat"), &blade, None).unwrap();
+    for station in [0, 3, 22] {
+        let eta = list_of(&deck, "stations")[station];
+        for shift in [1e-9, 5e-7, -5e-7] {
+            let place = eta + shift;
+            if !(0.0..=1.0).contains(&place) {
+                continue;
+            }
+            let loaded = nrel(&text("nrel_5mw.dat"), &blade, Some(&point_load(&format!("{place:?}")))).unwrap();
+            assert!(
+                loaded.contains(&format!("at = \"blade@{eta:?}\"\nforce = [0.0, 500.0, 0.0]")),
+                "{place}\n{loaded}"
+            );
         }
     }
-    let driver = text("nrel_5mw_driver.dat")
-        .replace("0   NumPointLoads", "1   NumPointLoads")
-        .replace("(N-m)        (N-m)        (N-m)\n", "(N-m)        (N-m)        (N-m)\n0.7 0 500 0 0 0 0\n");
+}
+
+/// Each member has a natural spline of its own, and is a beam; the beams meet at named points.
+#[test]
+fn members_are_beams_that_meet() {
+    let members = "2   member_total    - Total number of members (-)
+         23   kp_total        - Total number of key points (-)
+     1     12                - Member number; Number of key points in this member
+     2     12                - Member number; Number of key points in this member
+";
+    let primary = bent(&text("nrel_5mw.dat"));
+    let begin = primary.find("1   member_total").unwrap();
+    let end = primary.find("   kp_xr").unwrap();
+    let two = format!("{}{members}{}", &primary[..begin], &primary[end..]);
+    let blade = text("nrel_5mw_blade.dat");
+    let deck = nrel(&two, &blade, Some(&point_load("0.7"))).unwrap();
+    assert!(deck.contains("[point]\nmember_2 = [") && deck.contains("at = \"blade_2@"), "{deck}");
+    assert_eq!((deck.matches("\"member_2\"").count(), deck.matches("[[beam]]").count()), (2, 2), "{deck}");
+    let one = simulate(&nrel(&primary, &blade, Some(&point_load("0.7"))).unwrap()).end("blade@end.ux");
+    let two = simulate(&deck).end("blade_2@end.ux");
+    assert!((two / one - 1.0).abs() < 0.01, "{two} against {one}");
+}
+
+#[test]
+fn a_pitch_actuator_is_noted() {
+    let primary =
+        text("nrel_5mw.dat").replace("END of", "True  UsePitchAct - Whether a pitch actuator is used\nEND of");
+    let deck = nrel(&primary, &text("nrel_5mw_blade.dat"), None).unwrap();
+    assert!(deck.contains("# the pitch actuator (UsePitchAct) is not imported: the root is clamped"), "{deck}");
+}
+
+/// A blade that bends and sweeps is a spline; point loads find nodes.
+#[test]
+fn curved_blades_are_splines() {
+    let curved = bent(&text("nrel_5mw.dat"));
+    let driver = point_load("0.7");
     let deck = nrel(&curved, &text("nrel_5mw_blade.dat"), Some(&driver)).unwrap();
     assert!(deck.contains("spline = [") && deck.contains("at = \"blade@0.7\""), "{deck}");
     let run = simulate(&deck);
@@ -108,6 +193,14 @@ fn wrong_files_are_refused_at_their_place() {
         (
             nrel(&primary, &blade.replace("1.811360E+10", "-1.811360E+10"), None),
             "the stiffness of station 1 is not positive definite",
+        ),
+        (
+            nrel(&primary.replace("0.0   rhoinf", "1.5   rhoinf"), &blade, None),
+            "p.dat:6:9: `rhoinf` must be from 0 to 1, found 1.5",
+        ),
+        (
+            nrel(&primary, &blade, Some(&driver.replace("GlbPos(3)", "GlbPos"))),
+            "d.dat: there is no line with `GlbPos(3)`",
         ),
         (nrel(&primary, &blade, Some(&driver.replacen("1.0000000E+00  0.0000000E+00", "0.5  0.5", 1))), "GlbDCM"),
     ];
@@ -256,5 +349,158 @@ fn wrong_input_files_are_refused_at_their_place() {
         let _ = abaqus(&[&lines[..line], &lines[line + 1..]].concat().join("\n"));
         let _ = abaqus(&[&lines[..line], &[", =,*,\u{fffd}"], &lines[line + 1..]].concat().join("\n"));
         let _ = abaqus(&[&lines[..line], &["*"], &lines[line..]].concat().join("\n"));
+    }
+}
+
+fn abaqus_notes(text: &str) -> Vec<String> {
+    abaqus_deck(&read_abaqus("a.inp", text).unwrap()).unwrap().notes
+}
+
+fn with(from: &str, to: &str) -> String {
+    assert!(CANTILEVER.contains(from), "{from}");
+    CANTILEVER.replace(from, to)
+}
+
+/// A set of a line load may be any part of a straight run: the run is split where the load ends.
+#[test]
+fn line_loads_of_any_set_are_written() {
+    let part = with(
+        "*CLOAD\n5, 3, 1E-6",
+        "*ELSET, ELSET=\"Outer-1\"\n2\n*DLOAD\nOuter-1, PZ, -1E-6\nARM, PY, 2E-6\n1, PX, 0.",
+    );
+    let deck = abaqus(&part).unwrap();
+    assert_eq!(deck.matches("[[beam]]").count(), 2, "{deck}");
+    assert!(deck.contains("along = \"arm_1\"\nforce = [0.0, 2e-6, 0.0]"), "{deck}");
+    assert!(deck.contains("along = \"arm_2\"\nforce = [0.0, 2e-6, -1e-6]"), "{deck}");
+    let alike = with("*CLOAD\n5, 3, 1E-6", "*DLOAD\n1, PZ, -1E-6\n2, PZ, -1E-6");
+    let deck = abaqus(&alike).unwrap();
+    assert_eq!(deck.matches("[[beam]]").count(), 1, "{deck}");
+    let whole = with("*CLOAD\n5, 3, 1E-6", "*ELSET, ELSET=OTHER\nARM\n*DLOAD\nOTHER, PZ, -1E-6");
+    let deck = abaqus(&whole).unwrap();
+    assert_eq!(deck.matches("[[beam]]").count(), 1, "{deck}");
+    assert!(deck.contains("along = \"arm\"\nforce = [0.0, 0.0, -1e-6]"), "{deck}");
+}
+
+/// GRAV has an acceleration, and a direction whose length does not count.
+#[test]
+fn gravity_has_the_length_of_its_number() {
+    let deck = abaqus(&with("*CLOAD\n5, 3, 1E-6", "*DLOAD\nARM, GRAV, 9.81, 0., 0., -2.")).unwrap();
+    assert!(deck.contains("gravity = [0.0, 0.0, -9.81]"), "{deck}");
+    let deck = abaqus(&with("*CLOAD\n5, 3, 1E-6", "*DLOAD\n, GRAV, 10., 0., -4., 0.")).unwrap();
+    assert!(deck.contains("gravity = [0.0, -10.0, 0.0]"), "{deck}");
+}
+
+/// Elements of the plane stay in it: the nodes of a B22 have no uz, rx, ry.
+#[test]
+fn planar_elements_stay_in_their_plane() {
+    let deck = abaqus(&with("TYPE=B32", "TYPE=B22").replace("5, 3, 1E-6", "5, 2, 1E-6")).unwrap();
+    assert!(deck.contains("at = \"n1\"\nfix = \"all\""), "{deck}");
+    assert_eq!(deck.matches("fix = [\"uz\", \"rx\", \"ry\"]").count(), 4, "{deck}");
+    let bending = 1e-6 * 8.0 / (3.0 * 1000.0 * 0.1 * 0.008 / 12.0);
+    let run = simulate(&format!("{deck}[output]\nnodes = [\"n5\"]\ncolumns = [\"u\"]\n"));
+    assert!(run.end("n5.uy") > bending && run.end("n5.uy") < 1.02 * bending, "{}", run.end("n5.uy"));
+}
+
+#[test]
+fn names_that_become_alike_stay_apart() {
+    let text = "*NODE
+1, 0
+2, 1
+3, 2
+4, 2, 1
+*ELEMENT, TYPE=B31, ELSET=\"A-1\"
+1, 1, 2
+*ELEMENT, TYPE=B31, ELSET=A_1
+2, 2, 3
+3, 3, 4
+*MATERIAL, NAME=\"M-1\"
+*ELASTIC
+1., 0.25
+*MATERIAL, NAME=M_1
+*ELASTIC
+2., 0.25
+*BEAM SECTION, ELSET=A-1, MATERIAL=M-1, SECTION=CIRC
+0.1
+*BEAM SECTION, ELSET=\"A_1\", MATERIAL=M_1, SECTION=CIRC
+0.1
+0, 0, 1
+";
+    let deck = abaqus(text).unwrap();
+    for name in ["[material.m_1]", "[material.m_1_2]", "[section.a_1]", "[section.a_1_2]"] {
+        assert_eq!(deck.matches(name).count(), 1, "{name}\n{deck}");
+    }
+    let names: Vec<&str> = deck.lines().filter(|line| line.starts_with("name = ")).collect();
+    let mut alone = names.clone();
+    alone.sort_unstable();
+    alone.dedup();
+    assert_eq!((names.len(), alone.len()), (3, 3), "{deck}");
+}
+
+/// Parts of a file that are left out are noted with their line.
+#[test]
+fn all_that_is_left_out_is_noted() {
+    let cases = [
+        (
+            with("1, 1, 6", "1, 1, 6\n9, 1, 3").replace("5, 2.0", "5, 2.0\n9, 9."),
+            "line 18: *BOUNDARY is not imported at nodes that belong to no beam: 9",
+        ),
+        (
+            with("5, 3, 1E-6", "5, 3, 1E-6\n9, 1, 3.").replace("5, 2.0", "5, 2.0\n9, 9."),
+            "line 22: *CLOAD is not imported at nodes",
+        ),
+        (with("*CLOAD", "*CLOAD, AMPLITUDE=RAMP"), "line 19: the parameter AMPLITUDE of *CLOAD"),
+        (with("*BOUNDARY", "*BOUNDARY, OP=NEW"), "line 15: the parameter OP of *BOUNDARY"),
+    ];
+    for (text, told) in cases {
+        let notes = abaqus_notes(&text);
+        assert!(notes.len() == 1 && notes[0].starts_with(told), "{notes:?}\nexpected {told}");
+    }
+    let mixed = with("*MATERIAL", "*ELEMENT, TYPE=T3D2, ELSET=TIES\n7, 1, 5\n*ELSET, ELSET=EALL\nARM, TIES\n*MATERIAL");
+    assert_eq!(abaqus_notes(&mixed), ["line 10: *ELEMENT of type T3D2 is not imported"]);
+    assert!(abaqus_notes(CANTILEVER).is_empty());
+    assert!(abaqus_notes(&with("*BOUNDARY", "*BOUNDARY, OP=MOD")).is_empty());
+}
+
+/// A file whose geometry, material or numbers would change unseen is refused at the place.
+#[test]
+fn what_means_two_things_is_refused_at_its_place() {
+    let second = "2, 3, 4, 5\n";
+    let dload = |line: &str| with("*CLOAD\n5, 3, 1E-6", &format!("*DLOAD\n{line}"));
+    let section = "*BEAM SECTION, ELSET=ARM, MATERIAL=STEEL-1, SECTION=RECT\n0.1, 0.2\n";
+    let cases = [
+        (with("*NODE", "*PART, NAME=A\n*END PART\n*PART, NAME=B\n*NODE"), "a.inp:3:1: a second *PART"),
+        (with("*NODE", "*INSTANCE, NAME=A\n*END INSTANCE\n*INSTANCE, NAME=B\n*NODE"), "a.inp:3:1: a second *INSTANCE"),
+        (with("5, 2.0", "4, 2.0"), "a.inp:6:1: node 4 is given twice"),
+        (with(second, "1, 3, 4, 5\n"), "a.inp:9:1: element 1 is given twice"),
+        (with("*STEP", &format!("{section}*STEP")), "a.inp:17:1: element 1 has a *BEAM SECTION already, at line 13"),
+        (with(second, "*ELEMENT, TYPE=B32\n2, 1, 2, 3\n"), "a.inp:10:1: element 2 has no *BEAM SECTION"),
+        (with("*NODE", "*NODE, SYSTEM=C"), "a.inp:1:8: the parameter SYSTEM of *NODE"),
+        (with("SECTION=RECT", "SECTION=RECT, OFFSET1=0.5"), "a.inp:13:59: the parameter OFFSET1 of *BEAMSECTION"),
+        (with(second, "2, 3, 4, 5, 1\n"), "a.inp:9:13: a node of orientation"),
+        (with("1000., 0.25", "1000., 0.25, 20.\n900., 0.25, 100."), "a.inp:13:1: *ELASTIC that depends on temperature"),
+        (with("*MATERIAL, NAME=Steel-1", "*MATERIAL, NAME=Steel-1\n*MATERIAL, NAME=\"STEEL-1\""), "is given twice"),
+        (with("*NODE", "*TRANSFORM, NSET=A\n*NODE"), "a.inp:1:1: *TRANSFORM is not imported"),
+        (with("3, 1.0", "3, 1.0, 0., 0., 0., 1., 0."), "a.inp:4:17: a normal at a node"),
+        (dload("2, GRAV, 9.81, 0., 0., -1."), "a.inp:20:1: GRAV is imported only for all beam elements"),
+        (dload("ARM, GRAV, 9.81"), "a.inp:20:1: GRAV needs"),
+        (dload("ARM, GRAV, 9.81, 0., 0., -1.\nARM, GRAV, 1., 1., 0., 0."), "a.inp:21:1: a second GRAV"),
+        (dload("9, PX, 1."), "a.inp:20:1: `9` has no beam elements"),
+        (with("1, 1, 6", "1, 6, 1"), "a.inp:16:7: the last direction, 1, is below the first, 6"),
+        (
+            with("*BOUNDARY", "*NSET, NSET=S, GENERATE\n5, 1\n*BOUNDARY"),
+            "a.inp:16:1: GENERATE goes up, but 1 is below 5",
+        ),
+        (
+            with("TYPE=B32", "TYPE=B22").replace("5, 2.0", "5, 2.0, 0., 1."),
+            "a.inp:9:1: an element of type B22 must lie in the plane",
+        ),
+        (
+            with("*BOUNDARY", "*NSET, NSET=S\n1\n*ASSEMBLY\n*NSET, NSET=S\n5\n*BOUNDARY"),
+            "a.inp:18:1: the set S is one of the part and one of the assembly",
+        ),
+    ];
+    for (text, told) in cases {
+        let message = abaqus(&text).expect_err(told);
+        assert!(message.contains(told), "{message}\nexpected {told}");
     }
 }

@@ -54,7 +54,7 @@ impl Viscosity {
         }
     }
 
-    /// What the stiffness of a point is multiplied with.
+    /// The factor of the stiffness of a point, in units of time.
     fn factor(&self) -> f64 {
         match self {
             Self::Proportional(factor) => *factor,
@@ -147,7 +147,7 @@ struct PointDamping<'a, const G: usize> {
 }
 
 impl<const G: usize> PointDamping<'_, G> {
-    /// What is multiplied with the factor and a strain rate.
+    /// The matrix that gives damping resultants when multiplied with the factor and a strain rate.
     fn stiffness<const N: usize>(&self, points: &[ElasticPoint<N>; G], g: usize) -> Stiffness {
         match self.own {
             Some(own) => own[g],
