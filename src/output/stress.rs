@@ -56,7 +56,7 @@ pub fn write_profile(folder: &ResultFolder, mesh: &Mesh, profile: &Profile) -> R
         let load = Vector6::from(*resultants);
         let lowest = f64::NEG_INFINITY;
         let of_section = |find: &dyn Fn(&PlacedRecovery) -> Option<f64>| {
-            place.section.as_ref().and_then(|section| find(section)).map_or(String::new(), number)
+            place.section.as_ref().and_then(find).map_or(String::new(), number)
         };
         if has_stress {
             cells.push(of_section(&|section| Some(section.largest(Measure::VonMises, &load, lowest)?.value)));
