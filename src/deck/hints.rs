@@ -209,7 +209,7 @@ const SYNONYMS: &[Synonym] = &[
     Synonym { written: &["mesh", "n_elements", "num_elements", "nel", "ne", "n", "element", "divisions", "segments", "num_elem", "n_elem", "number_of_elements", "ndiv"], meant: &["elements"] },
     Synonym { written: &["degree", "polynomial_order", "order_elem", "num_node_elem", "nodes_per_element", "n_nodes", "polynomial_degree"], meant: &["order"] },
     Synonym { written: &["path", "polyline", "centerline", "centreline", "geometry"], meant: &["through"] },
-    Synonym { written: &["curve", "bspline", "b_spline", "nurbs", "cubic", "interpolated"], meant: &["spline", "through"] },
+    Synonym { written: &["curve", "bspline", "nurbs", "cubic", "interpolated"], meant: &["spline", "through"] },
     Synonym { written: &["coil", "spiral", "helical", "helicoid"], meant: &["helix"] },
     Synonym { written: &["orientation", "up", "normal", "local_z", "z_axis", "frame_of_reference_delta", "local_y", "y_axis", "normals", "d1"], meant: &["axis3", "axis"] },
     Synonym { written: &["profile", "cross_section", "property", "sec", "sect", "secid", "sec_tag"], meant: &["section"] },

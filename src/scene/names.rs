@@ -121,7 +121,12 @@ impl Mesh {
     fn beam(&self, deck: &Deck, name: &Spanned<String>, beam: &str) -> Result<usize, Diagnostic> {
         self.beams.iter().position(|b| b.name == beam).ok_or_else(|| {
             let name = Spanned { value: beam.to_string(), span: name.span.clone() };
-            unknown("beam", &name, deck.beams.iter().map(|b| b.name.value.as_str()))
+            let mut diagnostic = unknown("beam", &name, deck.beams.iter().map(|b| b.name.value.as_str()));
+            if deck.beams.iter().any(|b| b.name.value == beam) {
+                // It could not be meshed, which is told already.
+                diagnostic.unknown = None;
+            }
+            diagnostic
         })
     }
 

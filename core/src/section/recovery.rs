@@ -414,6 +414,9 @@ fn in_material_axes(unit: &Matrix6, [beta, theta]: [f64; 2]) -> Matrix6 {
     }))
 }
 
+/// Passes along both coordinates with steps of one length, at most.
+const MOST_PASSES: usize = 8;
+
 /// From a sample of a closed form to the largest value near it: parabolas along both coordinates,
 /// with shorter and shorter steps.
 fn climb(form: ClosedForm, start: [usize; 2], value: &dyn Fn([f64; 2]) -> f64) -> (f64, [f64; 2]) {
@@ -422,30 +425,49 @@ fn climb(form: ClosedForm, start: [usize; 2], value: &dyn Fn([f64; 2]) -> f64) -
     let steps = [0, 1].map(|axis| (domain[axis][1] - domain[axis][0]) / counts[axis] as f64);
     let mut at = [0, 1].map(|axis| domain[axis][0] + steps[axis] * start[axis] as f64);
     let mut best = value(at);
-    for shorter in [1.0, 0.5, 0.25, 0.125, 0.0625] {
-        for axis in 0..2 {
-            let step = shorter * steps[axis];
-            let moved = |by: f64| {
-                let mut to = at;
-                to[axis] += by;
-                // A radius below zero is one on the other side of the centre.
-                let [low, high] =
-                    if axis == 0 && domain[0][0] == 0.0 { [-domain[0][1], domain[0][1]] } else { domain[axis] };
-                let is_inside = low <= to[axis] && to[axis] <= high;
-                (is_inside || form.is_closed(axis)).then(|| (value(to), to))
-            };
-            let (Some(before), Some(behind)) = (moved(-step), moved(step)) else { continue };
-            let bend = before.0 - 2.0 * best + behind.0;
-            let turn = if bend < 0.0 { 0.5 * step * (before.0 - behind.0) / bend } else { 0.0 };
-            let tops = [Some(before), Some(behind), moved(turn.clamp(-step, step))];
-            for (found, to) in tops.into_iter().flatten() {
-                if found > best {
-                    (best, at) = (found, to);
-                }
+    for shorter in [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125] {
+        for _ in 0..MOST_PASSES {
+            let before_pass = best;
+            for (axis, step) in steps.into_iter().enumerate() {
+                climb_along(form, axis, shorter * step, value, &mut at, &mut best);
+            }
+            if best <= before_pass {
+                break;
             }
         }
     }
     (best, at)
+}
+
+/// From a point of a closed form, with its value, to a larger value along one coordinate: the top of
+/// the parabola through it and both neighbours at a distance of `step`, or one of these.
+fn climb_along(
+    form: ClosedForm,
+    axis: usize,
+    step: f64,
+    value: &dyn Fn([f64; 2]) -> f64,
+    at: &mut [f64; 2],
+    best: &mut f64,
+) {
+    let domain = form.domain();
+    let start = *at;
+    let moved = |by: f64| {
+        let mut to = start;
+        to[axis] += by;
+        // A radius below zero is one on the other side of the centre.
+        let [low, high] = if axis == 0 && domain[0][0] == 0.0 { [-domain[0][1], domain[0][1]] } else { domain[axis] };
+        let is_inside = low <= to[axis] && to[axis] <= high;
+        (is_inside || form.is_closed(axis)).then(|| (value(to), to))
+    };
+    let (Some(before), Some(behind)) = (moved(-step), moved(step)) else { return };
+    let bend = before.0 - 2.0 * *best + behind.0;
+    let turn = if bend < 0.0 { 0.5 * step * (before.0 - behind.0) / bend } else { 0.0 };
+    let tops = [Some(before), Some(behind), moved(turn.clamp(-step, step))];
+    for (found, to) in tops.into_iter().flatten() {
+        if found > *best {
+            (*best, *at) = (found, to);
+        }
+    }
 }
 
 #[cfg(test)]

@@ -5,12 +5,14 @@
 //! state is accepted.
 
 mod chain;
+mod laws;
 mod pairs;
 mod resultant;
 mod strand;
 mod surface;
 
 pub use chain::Chain;
+pub use laws::ContactLaws;
 pub use pairs::{BeamPairs, Meeting};
 pub use strand::{ChainNode, ContactStiffness, Strand};
 pub use surface::{SceneSurface, SurfaceCarrier};
@@ -31,44 +33,12 @@ use crate::system::{
 };
 use crate::tensor::{Mat3, Vec3};
 use chain::{Candidate, shape};
+use laws::{RELEVANT_FORCE, ROUNDED, TOUCHING};
 use pairs::PairRole;
 use std::sync::Arc;
 
-/// The gap up to which a point without a force counts as touching, over the largest penetration.
-const TOUCHING: f64 = 1e-4;
-
 /// Factor of the first stiffness of points that are held in modal stages: about that of elements.
 const HELD: f64 = 1e4;
-
-/// Penetrations that are told exceed the allowed one by this factor.
-const ROUNDED: f64 = 1.01;
-
-/// Forces below this part of the largest need no small gap.
-const RELEVANT_FORCE: f64 = 1e-6;
-
-/// The laws of a contact.
-#[derive(Clone, Debug)]
-pub struct ContactLaws {
-    /// Its name
-    pub name: String,
-    /// Coefficients of friction at the start and at the end of beams
-    pub friction: [f64; 2],
-    /// Tangential over normal stiffness
-    pub stick: f64,
-    /// The largest penetration, a length
-    pub penetration: f64,
-    /// c of the penalty, time per length
-    pub damping: f64,
-    /// The index of its amplitude, which is 0 in stages without it and otherwise 1
-    pub amplitude: usize,
-}
-
-impl ContactLaws {
-    /// True if it has friction.
-    pub fn rubs(&self) -> bool {
-        self.friction != [0.0; 2]
-    }
-}
 
 /// All contacts with rigid surfaces, and of beams with each other.
 #[derive(Clone, Debug, Default)]

@@ -3,8 +3,8 @@
 use super::candidate::{PairCandidate, Side, candidates};
 use super::{BeamPairs, ElementOf};
 use crate::effect::contact::chain::LARGEST_SHIFT;
+use crate::effect::contact::laws::{ContactLaws, TOUCHING};
 use crate::effect::contact::strand::ContactStiffness;
-use crate::effect::contact::{ContactLaws, TOUCHING};
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::{
     CarriedTraction, ContactNode, NodeBefore, NormalLaw, PairLaw, PairSide, PointState, ShapeAt, add_pair,

@@ -2,8 +2,8 @@
 
 use super::BeamPairs;
 use super::point::{PairPoint, PairsNow};
+use crate::effect::contact::laws::{ContactLaws, RELEVANT_FORCE, ROUNDED};
 use crate::effect::contact::strand::ContactStiffness;
-use crate::effect::contact::{ContactLaws, RELEVANT_FORCE, ROUNDED};
 use crate::effect::{ContactChange, ContactResultant, ContactSurvey, Penetration};
 use crate::kernel::Weights;
 use crate::kernel::contact::{NormalLaw, Status};

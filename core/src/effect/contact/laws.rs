@@ -1,0 +1,34 @@
+//! The laws of a contact, and bounds that surfaces and pairs of beams share.
+
+/// The gap up to which a point without a force counts as touching, over the largest penetration.
+pub(super) const TOUCHING: f64 = 1e-4;
+
+/// Penetrations that are told exceed the allowed one by this factor.
+pub(super) const ROUNDED: f64 = 1.01;
+
+/// Forces below this part of the largest need no small gap.
+pub(super) const RELEVANT_FORCE: f64 = 1e-6;
+
+/// The laws of a contact.
+#[derive(Clone, Debug)]
+pub struct ContactLaws {
+    /// Its name
+    pub name: String,
+    /// Coefficients of friction at the start and at the end of beams
+    pub friction: [f64; 2],
+    /// Tangential over normal stiffness
+    pub stick: f64,
+    /// The largest penetration, a length
+    pub penetration: f64,
+    /// c of the penalty, time per length
+    pub damping: f64,
+    /// The index of its amplitude, which is 0 in stages without it and otherwise 1
+    pub amplitude: usize,
+}
+
+impl ContactLaws {
+    /// True if it has friction.
+    pub fn rubs(&self) -> bool {
+        self.friction != [0.0; 2]
+    }
+}
