@@ -417,6 +417,9 @@ fn in_material_axes(unit: &Matrix6, [beta, theta]: [f64; 2]) -> Matrix6 {
 /// Passes along both coordinates with steps of one length, at most.
 const MOST_PASSES: usize = 8;
 
+/// A pass that adds less than this part of the value is the last one with its steps.
+const SMALL_GAIN: f64 = 1e-6;
+
 /// From a sample of a closed form to the largest value near it: parabolas along both coordinates,
 /// with shorter and shorter steps.
 fn climb(form: ClosedForm, start: [usize; 2], value: &dyn Fn([f64; 2]) -> f64) -> (f64, [f64; 2]) {
@@ -431,7 +434,7 @@ fn climb(form: ClosedForm, start: [usize; 2], value: &dyn Fn([f64; 2]) -> f64) -
             for (axis, step) in steps.into_iter().enumerate() {
                 climb_along(form, axis, shorter * step, value, &mut at, &mut best);
             }
-            if best <= before_pass {
+            if best - before_pass <= SMALL_GAIN * best.abs() {
                 break;
             }
         }
