@@ -70,6 +70,7 @@ fn all(wanted: &SectionArguments) -> Result<(), CommandError> {
         }
         let shown =
             stresses.as_ref().map_or(Vec::new(), |stresses| section_stress::show(stresses, &loads, &units, digits));
+        report.table().lines().for_each(console::line);
         let picture = picture_name(&section.name.value, deck);
         let pictures = match (solved.as_ref().and_then(|solved| solved.solution.as_ref()), &stresses) {
             (Some(solution), Some(stresses)) => {
@@ -169,7 +170,6 @@ impl<'a> Report<'a> {
         if let Some(mass) = self.mass {
             self.value("mass per length", mass[(0, 0)], MASS_PER_LENGTH);
         }
-        self.table().lines().for_each(console::line);
     }
 
     /// Shear stiffness over that of uniform shear, for sections of one isotropic material.

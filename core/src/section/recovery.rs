@@ -5,7 +5,7 @@
 //! in its axes; those of a [`PlacedRecovery`] are about the line of the beam, in the axes of the
 //! beam. Places, and stresses at fixed points, are in the coordinates of the shape.
 
-use super::closed::ClosedForm;
+use super::closed::{ClosedForm, ClosedShape};
 use super::material::{material_axes, stress_in_material_axes};
 use super::mesh::Mesh;
 use super::properties::load_about_origin;
@@ -359,7 +359,8 @@ impl Recovery {
             hits.push(first);
         }
         let in_field = self.to_field * load;
-        let value = |at: [f64; 2]| measure(&(form.unit(form.point(at)) * in_field));
+        let value_at = |point: Point| measure(&(form.unit(point) * in_field));
+        let value = |at: [f64; 2]| value_at(form.point(at));
         let mut best = (first.value, self.points[first.point].0);
         let mut starts: Vec<[usize; 2]> = Vec::new();
         for hit in hits {
@@ -369,8 +370,9 @@ impl Recovery {
                 continue;
             }
             let (found, at) = climb(form, start, &value);
+            let (found, point) = cross_centre(form, (found, form.point(at)), &value_at);
             if found > best.0 {
-                best = (found, form.point(at));
+                best = (found, point);
             }
             starts.push(start);
             if starts.len() == STARTS {
@@ -442,6 +444,29 @@ fn climb(form: ClosedForm, start: [usize; 2], value: &dyn Fn([f64; 2]) -> f64) -
     (best, at)
 }
 
+/// Smallest step across the centre of a circle, as a part of its radius.
+const SMALLEST_STEP: f64 = 1e-3;
+
+/// From a value and its point in a solid circle to the largest value near it, by steps in eight
+/// directions: near the centre the angle of a point says little. Other shapes keep the point.
+fn cross_centre(form: ClosedForm, start: (f64, Point), value: &dyn Fn(Point) -> f64) -> (f64, Point) {
+    let ClosedShape::Ring { radii: [0.0, radius] } = form.shape else { return start };
+    let (mut best, mut at) = start;
+    let mut step = radius / form.samples()[0] as f64;
+    while step > SMALLEST_STEP * radius {
+        let around = (0..8).map(|k| {
+            let (sin, cos) = libm::sincos(f64::from(k) * std::f64::consts::FRAC_PI_4);
+            [at[0] + step * cos, at[1] + step * sin]
+        });
+        let inside = around.filter(|to| libm::hypot(to[0], to[1]) <= radius);
+        match inside.map(|to| (value(to), to)).max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((found, to)) if found > best => (best, at) = (found, to),
+            Some(_) | None => step *= 0.5,
+        }
+    }
+    (best, at)
+}
+
 /// From a point of a closed form, with its value, to a larger value along one coordinate: the top of
 /// the parabola through it and both neighbours at a distance of `step`, or one of these.
 fn climb_along(
@@ -475,7 +500,6 @@ fn climb_along(
 
 #[cfg(test)]
 mod tests {
-    use super::super::closed::ClosedShape;
     use super::*;
     use std::f64::consts::PI;
 
