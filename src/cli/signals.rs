@@ -62,17 +62,22 @@ pub fn caught() -> Option<i32> {
     }
 }
 
-/// From here on signals are heard. If the system gives no thread for that, they end the process as
-/// they would anyway.
+/// When this returns signals are heard: no file is open before. If the system gives no thread for
+/// that, they end the process as they would anyway.
 pub fn listen() {
     // A file that may not grow is an error of writing, not the end of the process.
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
-    let hear_all = || {
+    let (sender, ready) = mpsc::channel();
+    let hear_all = move || {
         let Ok(mut signals) = Signals::new(heard()) else { return };
+        let _ = sender.send(());
         let mut first = None;
         signals.forever().for_each(|signal| hear(signal, &mut first));
     };
-    let _ = thread::Builder::new().name("signals".into()).stack_size(STACK_BYTES).spawn(hear_all);
+    if thread::Builder::new().name("signals".into()).stack_size(STACK_BYTES).spawn(hear_all).is_ok() {
+        // An error means that the system takes no handlers.
+        let _ = ready.recv();
+    }
 }
 
 /// The signals that are heard. Those that are switched off stay so: a hang-up by `nohup`, an
