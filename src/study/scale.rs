@@ -58,7 +58,7 @@ fn scale_quantity(output: &str) -> Option<Quantity> {
 
 /// True if an output changes in jumps, so that its error says nothing about a mesh.
 pub(super) fn jumps(output: &str) -> bool {
-    quantity(output).is_some_and(Quantity::jumps)
+    mesh_error(output) == MeshError::Jumps
 }
 
 /// Order at which the error of an output falls with the width of elements.

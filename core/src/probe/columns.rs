@@ -185,6 +185,8 @@ pub enum MeshError {
     Slopes,
     /// No order is promised
     Unspecified,
+    /// None: it changes in jumps, from one node to the next or from stage to stage
+    Jumps,
 }
 
 /// All groups: those of nodes, of the whole scene, and of the run. Where suffixes stand in two
@@ -631,11 +633,6 @@ impl Quantity {
         }
     }
 
-    /// True if it changes in jumps from one node to the next, so that it has no order of errors.
-    pub fn jumps(self) -> bool {
-        matches!(self, Self::ContactLength | Self::ContactPoints | Self::Stage)
-    }
-
     /// Order at which its error falls with the width of elements.
     pub fn mesh_error(self) -> MeshError {
         match self {
@@ -648,6 +645,7 @@ impl Quantity {
             | Self::AngularVelocity
             | Self::Energy => MeshError::Nodes,
             Self::SectionForce | Self::SectionMoment => MeshError::Slopes,
+            Self::ContactLength | Self::ContactPoints | Self::Stage => MeshError::Jumps,
             Self::Acceleration
             | Self::AngularAcceleration
             | Self::ReactionForce
@@ -663,11 +661,8 @@ impl Quantity {
             | Self::ContactForce
             | Self::ContactMoment
             | Self::ContactForcePerLength
-            | Self::ContactLength
-            | Self::ContactPoints
             | Self::AngularFrequency
             | Self::GrowthRate
-            | Self::Stage
             | Self::Time
             | Self::LoadFactor => MeshError::Unspecified,
         }

@@ -32,7 +32,7 @@ impl Falls {
     fn of(column: &str) -> Self {
         match mesh_error(column) {
             MeshError::Slopes => Self::Slopes,
-            MeshError::Nodes | MeshError::Unspecified => Self::Places,
+            MeshError::Nodes | MeshError::Unspecified | MeshError::Jumps => Self::Places,
         }
     }
 
