@@ -288,7 +288,7 @@ impl Recovery {
     /// The largest value of a measure over the section, if it is above a floor.
     pub fn largest(&self, measure: Measure, load: &Vector6, floor: f64) -> Option<Peak> {
         let spread = self.spreads[measure as usize].get_or_init(|| self.tree.spread(|s| measure.of(s)));
-        self.search(&self.tree, spread, &|s| measure.of(s), load, floor)
+        self.search(&self.tree, spread, &|s| measure.of(s), load, floor, None)
     }
 
     /// The largest failure index over the section, if it is above a floor.
@@ -297,14 +297,15 @@ impl Recovery {
         for FailureSearch { law, tree, spread, points } in &self.failures {
             let spread = spread.get_or_init(|| tree.spread(|s| law.index(s)));
             let floor = best.map_or(floor, |best| best.value);
-            // Closed forms have one material, so that numbers are those of all points.
-            if let Some(found) = self.search_among(tree, spread, &|s| law.index(s), load, floor, points) {
+            if let Some(found) = self.search(tree, spread, &|s| law.index(s), load, floor, Some(points)) {
                 best = Some(found);
             }
         }
         best
     }
 
+    /// The largest value among the points of a tree, if it is above a floor; `points` are their
+    /// numbers, if they are some of all points. A closed form has one material, and all points.
     fn search(
         &self,
         tree: &PointTree,
@@ -312,27 +313,14 @@ impl Recovery {
         measure: &dyn Fn(&Vector6) -> f64,
         load: &Vector6,
         floor: f64,
+        points: Option<&[u32]>,
     ) -> Option<Peak> {
-        match self.closed {
-            Some(form) => self.between_samples(form, tree, spread, measure, load, floor),
-            None => tree.largest(spread, measure, load, floor).map(|hit| self.peak(hit)),
-        }
-    }
-
-    fn search_among(
-        &self,
-        tree: &PointTree,
-        spread: &Spread,
-        measure: &dyn Fn(&Vector6) -> f64,
-        load: &Vector6,
-        floor: f64,
-        points: &[u32],
-    ) -> Option<Peak> {
-        if self.closed.is_some() {
-            return self.search(tree, spread, measure, load, floor);
+        if let Some(form) = self.closed {
+            return self.between_samples(form, tree, spread, measure, load, floor);
         }
         let hit = tree.largest(spread, measure, load, floor)?;
-        Some(self.peak(Hit { point: points[hit.point] as usize, ..hit }))
+        let point = points.map_or(hit.point, |points| points[hit.point] as usize);
+        Some(self.peak(Hit { point, ..hit }))
     }
 
     fn peak(&self, hit: Hit) -> Peak {
