@@ -182,3 +182,21 @@ impl Random {
         Rotation::new(self.direction() * angle)
     }
 }
+
+/// Largest errors of forces and tangents over many scenes.
+#[derive(Debug, Default)]
+pub struct Errors {
+    pub count: usize,
+    pub stick: usize,
+    pub slip: usize,
+    pub tangent: f64,
+    pub force_sum: f64,
+    pub moment_sum: f64,
+    pub asymmetry: f64,
+    pub objectivity: f64,
+}
+
+/// The largest entry of a tangent, at least one.
+pub fn size(system: &ElementSystem) -> f64 {
+    system.tangent().iter().fold(1.0, |largest: f64, entry| largest.max(entry.abs()))
+}

@@ -2,7 +2,7 @@
 
 use super::along::{ShapeAt, weighted_sum};
 use super::beam_pair::{PairLaw, PairSide, add_pair};
-use super::dual::{Dual, Random, along, tangent_error};
+use super::dual::{Dual, Errors, Random, along, size, tangent_error};
 use super::friction::{CarriedTraction, FrictionLaw, Status};
 use super::law::NormalLaw;
 use super::pair_search::bilateral;
@@ -137,23 +137,6 @@ impl<const NA: usize, const NB: usize> Scene<NA, NB> {
     }
 }
 
-/// Largest errors over many pairs.
-#[derive(Debug, Default)]
-struct Errors {
-    pairs: usize,
-    stick: usize,
-    slip: usize,
-    tangent: f64,
-    force_sum: f64,
-    moment_sum: f64,
-    asymmetry: f64,
-    objectivity: f64,
-}
-
-fn size(system: &ElementSystem) -> f64 {
-    system.tangent().iter().fold(1.0, |largest: f64, entry| largest.max(entry.abs()))
-}
-
 /// Two elements that cross at a distance, with a contact that has a force.
 fn random_pair<const NA: usize, const NB: usize>(
     random: &mut Random,
@@ -266,7 +249,7 @@ fn examine<const NA: usize, const NB: usize>(
     damped: bool,
     errors: &mut Errors,
 ) {
-    errors.pairs += 1;
+    errors.count += 1;
     match scene.now(Weights::NONE).1.status() {
         Status::Sticks => errors.stick += 1,
         Status::Slides => errors.slip += 1,
@@ -325,7 +308,7 @@ fn pairs_have_their_tangent() {
     for (k, errors) in all.iter().enumerate() {
         let nodes = [k / 3 + 2, k % 3 + 2];
         println!("pairs of {nodes:?} nodes: {errors:?}");
-        assert!(errors.pairs >= 40 && errors.stick >= 3 && errors.slip >= 3, "{nodes:?}: {errors:?}");
+        assert!(errors.count >= 40 && errors.stick >= 3 && errors.slip >= 3, "{nodes:?}: {errors:?}");
         assert!(errors.tangent < 1e-12 && errors.objectivity < 1e-11, "{nodes:?}: {errors:?}");
         assert!(errors.force_sum < 1e-14 && errors.moment_sum < 1e-14, "{nodes:?}: {errors:?}");
         assert!(errors.asymmetry < 1e-13, "{nodes:?}: {errors:?}");

@@ -1,7 +1,7 @@
 //! Contact points against dual numbers, balance of forces and moments, objectivity, symmetry.
 
 use super::along::{MinimumKind, ShapeAt, minima, slopes, weighted_sum};
-use super::dual::{Dual, Random, along, tangent_error};
+use super::dual::{Dual, Errors, Random, along, size, tangent_error};
 use super::friction::{CarriedTraction, FrictionLaw, Status};
 use super::law::NormalLaw;
 use super::point::{Carrier, ContactLaw, Place, PointState, add_point};
@@ -295,23 +295,6 @@ fn set_friction<const N: usize>(random: &mut Random, scene: &mut Scene<N>, norma
         Some(FrictionLaw { coefficient: random.between(0.1, 1.5), stiffness: random.between(0.5, 3.0) });
 }
 
-/// Largest errors over many scenes.
-#[derive(Debug, Default)]
-struct Errors {
-    scenes: usize,
-    stick: usize,
-    slip: usize,
-    tangent: f64,
-    force_sum: f64,
-    moment_sum: f64,
-    asymmetry: f64,
-    objectivity: f64,
-}
-
-fn size(system: &ElementSystem) -> f64 {
-    system.tangent().iter().fold(1.0, |largest: f64, entry| largest.max(entry.abs()))
-}
-
 /// Sums of spatial forces and of moments about the origin, of the element and the carrier.
 fn sums<const N: usize>(scene: &Scene<N>) -> (Vec3, Vec3) {
     let (system, _) = scene.now(Weights::NONE);
@@ -380,7 +363,7 @@ fn examine<const N: usize>(random: &mut Random, surface: &Surface, kind: Kind, w
         if !kind.friction && !kind.damped {
             errors.asymmetry = errors.asymmetry.max(asymmetry(&scene.now(Weights::STIFFNESS).0));
         }
-        errors.scenes += 1;
+        errors.count += 1;
         found += 1;
         if found == wanted {
             break;
@@ -408,7 +391,7 @@ fn examine_all(place: Place, wanted: usize, seed: u64) {
             }
         }
         println!("{name}: {errors:?}");
-        assert!(errors.scenes >= 20 && errors.stick >= 4 && errors.slip >= 4, "{name}: {errors:?}");
+        assert!(errors.count >= 20 && errors.stick >= 4 && errors.slip >= 4, "{name}: {errors:?}");
         assert!(errors.tangent < 1e-12 && errors.objectivity < 1e-11, "{name}: {errors:?}");
         assert!(errors.force_sum < 1e-14 && errors.moment_sum < 1e-14, "{name}: {errors:?}");
         assert!(errors.asymmetry < 1e-13, "{name}: {errors:?}");
