@@ -497,9 +497,12 @@ fn named_between<'a>(
 /// True if the path of a beam names a point.
 fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
     let found = deck.beams.iter().find(|b| b.name.value == beam);
-    found.is_some_and(|b| match &b.path {
-        deck::Path::Arc([_, Spanned { value: PointRef::Name(middle), .. }, _]) if middle == point => true,
-        path => corner_names(path).contains(&Some(point)),
+    found.is_some_and(|b| {
+        let is_middle = matches!(
+            &b.path,
+            deck::Path::Arc([_, Spanned { value: PointRef::Name(middle), .. }, _]) if middle == point
+        );
+        is_middle || corner_names(&b.path).contains(&Some(point))
     })
 }
 
