@@ -27,6 +27,12 @@ pub struct ContactLaws {
 }
 
 impl ContactLaws {
+    /// The coefficient of friction at a part of the length of a beam.
+    pub(super) fn friction_at(&self, fraction: f64) -> f64 {
+        let [start, end] = self.friction;
+        start + (end - start) * fraction
+    }
+
     /// True if it has friction.
     pub fn rubs(&self) -> bool {
         self.friction != [0.0; 2]

@@ -51,6 +51,7 @@ impl BeamPairs {
             places: Arc::new(places),
             margin,
             points: Arc::default(),
+            nodes: Arc::default(),
         }
     }
 

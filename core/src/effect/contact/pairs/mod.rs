@@ -5,6 +5,7 @@
 //! carry it at the nodes of both ([`candidate`]).
 
 mod candidate;
+mod friction;
 mod list;
 mod point;
 mod role;

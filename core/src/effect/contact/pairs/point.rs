@@ -7,7 +7,7 @@ use crate::effect::contact::laws::{ContactLaws, TOUCHING};
 use crate::effect::contact::strand::ContactStiffness;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::{
-    CarriedTraction, ContactNode, NodeBefore, NormalLaw, PairLaw, PairSide, PointState, ShapeAt, add_pair,
+    CarriedTraction, ContactNode, NodeBefore, NormalLaw, PairLaw, PairSide, PointState, ShapeAt, Status, add_pair,
 };
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
@@ -26,17 +26,40 @@ pub(super) struct PairPoint<'a> {
     /// Number of the point that it was, and its memory
     pub partner: Option<(usize, &'a PairPointMemory)>,
     pub law: PairLaw,
+    /// Normal and traction in the axes of the carrier
     pub state: PointState,
+    /// The rotation of the carrier
+    pub carrier: Mat3,
     /// The place on the centre line of the first beam
     pub place: Vec3,
     /// The number of nodes to both sides, and their shape functions
     pub shapes: [[f64; 4]; 2],
 }
 
+impl PairPoint<'_> {
+    /// The normal, from the second beam to the first (global axes).
+    pub fn normal(&self) -> Vec3 {
+        self.carrier * self.state.normal
+    }
+
+    /// The friction on the first beam without the weight (global axes).
+    pub fn traction(&self) -> Vec3 {
+        self.carrier * self.state.traction.force
+    }
+}
+
 /// A candidate with the number of its pair.
 struct Found {
     number: usize,
     candidate: PairCandidate,
+}
+
+/// A candidate with its pair, and the point in memory that it was.
+struct Part<'a> {
+    number: usize,
+    pair: ListedPair,
+    candidate: PairCandidate,
+    partner: Option<(usize, &'a PairPointMemory)>,
 }
 
 /// A look at listed pairs in a state.
@@ -94,7 +117,7 @@ impl<'a> PairsNow<'a> {
         visit: &mut dyn FnMut(&PairPoint<'a>, &ElementSystem),
     ) {
         let memory = self.memory_of_meeting(group[0].meeting);
-        let reach = self.reach(group[0].meeting as usize, memory.1, laws);
+        let reach = self.reach(memory.1, laws);
         let mut found = Vec::new();
         for (number, pair) in (first..).zip(group) {
             if self.pairs.chord_gap(pair, &self.places) <= reach {
@@ -113,8 +136,8 @@ impl<'a> PairsNow<'a> {
             let partner = partner.map(|own| (memory.0 + own, &memory.1[own]));
             let law = self.law(&self.list[*number], candidate, partner.map(|(_, memory)| memory), laws);
             system.clear_for(weights);
-            let pair = self.list[*number];
-            let point = of_orders!(orders, self.point(*number, &pair, candidate, partner, law, weights, &mut system));
+            let part = Part { number: *number, pair: self.list[*number], candidate: *candidate, partner };
+            let point = of_orders!(orders, self.point(&part, law, weights, &mut system));
             if let Some(point) = point {
                 visit(&point, &system);
             }
@@ -130,12 +153,12 @@ impl<'a> PairsNow<'a> {
     }
 
     /// The largest gap at which points of a meeting may have a force, or touch.
-    fn reach(&self, meeting: usize, memory: &[PairPointMemory], laws: &ContactLaws) -> f64 {
+    fn reach(&self, memory: &[PairPointMemory], laws: &ContactLaws) -> f64 {
         let touching = TOUCHING * laws.penetration;
         let of_point = |point: &PairPointMemory| match self.at.contacts.regime {
             ContactRegime::Penalty => point.point.offset,
             ContactRegime::Augmented => {
-                let stiffness = self.stiffness_at(meeting, point).augmented * self.at.contacts.factor;
+                let stiffness = self.stiffness_at(point).augmented * self.at.contacts.factor;
                 point.point.multiplier / stiffness
             }
         };
@@ -143,15 +166,20 @@ impl<'a> PairsNow<'a> {
     }
 
     /// The stiffness of the contact at a point in memory.
-    pub fn stiffness_at(&self, meeting: usize, point: &PairPointMemory) -> ContactStiffness {
-        let strands = self.pairs.both(meeting);
+    pub fn stiffness_at(&self, point: &PairPointMemory) -> ContactStiffness {
+        self.stiffness(&self.pair_of(point))
+    }
+
+    /// The elements of a point in memory.
+    pub fn pair_of(&self, point: &PairPointMemory) -> ListedPair {
+        let strands = self.pairs.both(point.meeting as usize);
         let place = [point.point.place, point.on_second];
         let element = |side: usize| (place[side] as usize).min(strands[side].elements() - 1) as u32;
-        self.stiffness(&ListedPair { meeting: meeting as u32, elements: [element(0), element(1)] })
+        ListedPair { meeting: point.meeting, elements: [element(0), element(1)] }
     }
 
     /// The stiffness of the contact of two elements: that of both in series.
-    fn stiffness(&self, pair: &ListedPair) -> ContactStiffness {
+    pub fn stiffness(&self, pair: &ListedPair) -> ContactStiffness {
         let strands = self.pairs.both(pair.meeting as usize);
         let [a, b] = [0, 1].map(|side| strands[side].stiffness[pair.elements[side] as usize]);
         let in_series = |a: f64, b: f64| a * b / (a + b);
@@ -282,48 +310,60 @@ impl<'a> PairsNow<'a> {
         let [a, b] = self.pairs.both(pair.meeting as usize);
         let is_penalty = contacts.regime == ContactRegime::Penalty;
         let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.point.offset);
+        let friction = self.friction(pair, candidate, laws);
+        let carrier = if friction.is_some() { self.carrier(pair, partner) } else { 0 };
+        let carried = match (friction, partner) {
+            (Some(_), Some(partner)) => self.carried(pair, carrier, partner),
+            _ => CarriedTraction::default(),
+        };
         PairLaw {
             radii: [a.radius + offset, b.radius],
             normal,
-            friction: None,
-            carried: CarriedTraction::default(),
-            carrier: 0,
+            friction,
+            carried,
+            carrier,
             free: candidate.free,
             weight: candidate.weight,
         }
     }
 
-    #[allow(clippy::too_many_arguments)]
     fn point<const NA: usize, const NB: usize>(
         &self,
-        number: usize,
-        pair: &ListedPair,
-        candidate: &PairCandidate,
-        partner: Option<(usize, &'a PairPointMemory)>,
+        part: &Part<'a>,
         law: PairLaw,
         weights: Weights,
         out: &mut ElementSystem,
     ) -> Option<PairPoint<'a>> {
-        let [a, b] = [0, 1].map(|side| (self.pairs.nodes_of(pair)[side], candidate.at[side]));
-        let a = PairSide::<NA> { nodes: std::array::from_fn(|i| self.node(&a.0[i])), shape: ShapeAt::new(a.1) };
-        let b = PairSide::<NB> { nodes: std::array::from_fn(|i| self.node(&b.0[i])), shape: ShapeAt::new(b.1) };
+        let Part { number, pair, candidate, partner } = *part;
+        let a = self.pair_side::<NA>(&pair, 0, candidate.at[0], &law);
+        let b = self.pair_side::<NB>(&pair, 1, candidate.at[1], &law);
         let state = add_pair(&a, &b, &law, weights, out)?;
         let mut shapes = [[0.0; 4]; 2];
         shapes[0][..NA].copy_from_slice(&a.shape.values);
         shapes[1][..NB].copy_from_slice(&b.shape.values);
-        Some(PairPoint { number, pair: *pair, candidate: *candidate, partner, law, state, place: a.place(), shapes })
+        let carrier = b.nodes[law.carrier].rotation.r;
+        Some(PairPoint { number, pair, candidate, partner, law, state, carrier, place: a.place(), shapes })
     }
 
-    fn node(&self, node: &super::ChainNode) -> ContactNode {
-        ContactNode {
-            place: node.place + self.at.q[node.node.u as usize],
-            velocity: self.at.v[node.node.u as usize],
-            rotation: Rotation::new(Vec3::ZERO),
-            before: NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY },
-        }
+    /// One of both elements of a pair at the place of a point.
+    fn pair_side<const N: usize>(&self, pair: &ListedPair, side: usize, at: f64, law: &PairLaw) -> PairSide<N> {
+        let nodes = self.pairs.nodes_of(pair)[side];
+        let node = |i: usize| {
+            let node = &nodes[i];
+            let place = node.place + self.at.q[node.node.u as usize];
+            let velocity = self.at.v[node.node.u as usize];
+            if law.friction.is_none() {
+                let before = NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY };
+                return ContactNode { place, velocity, rotation: Rotation::new(Vec3::ZERO), before };
+            }
+            let before = self.before(pair, law.carrier, [side, i]);
+            ContactNode { place, velocity, rotation: self.at.rotation(node.node.p), before }
+        };
+        PairSide { nodes: std::array::from_fn(node), shape: ShapeAt::new(at) }
     }
 
-    /// The memory of a point with a force.
+    /// The memory of a point with a force. Before a state is accepted, traction and normal remain
+    /// those of the last one.
     pub fn memory_of(&self, point: &PairPoint, accepts: bool) -> PairPointMemory {
         let PairPoint { pair, candidate, state, law, .. } = point;
         let [a, _] = self.pairs.both(pair.meeting as usize);
@@ -331,10 +371,21 @@ impl<'a> PairsNow<'a> {
         let offset = law.radii[0] - a.radius;
         let gap = state.gap + offset;
         let force = state.normal_force.force;
+        let normal = point.normal();
         // Stages go on with the first stiffness.
         let first = self.stiffness(pair).augmented * contacts.first_factor;
         let is_penalty = contacts.regime == ContactRegime::Penalty;
         let before = point.partner.filter(|_| is_penalty).map(|(_, before)| before.point);
+        let known = point.partner.map_or(CarriedTraction::default(), |(_, known)| CarriedTraction {
+            force: known.point.traction,
+            normal: known.point.normal,
+            slides: known.point.slides,
+        });
+        let carried = if accepts {
+            CarriedTraction { force: point.traction(), normal, slides: state.status() == Status::Slides }
+        } else {
+            known
+        };
         PairPointMemory {
             meeting: pair.meeting,
             kind: candidate.kind,
@@ -346,13 +397,13 @@ impl<'a> PairsNow<'a> {
                 force,
                 multiplier: if accepts { force + first * gap } else { force },
                 gap,
-                traction: Vec3::ZERO,
-                normal: state.normal,
-                slides: false,
+                traction: carried.force,
+                normal: carried.normal,
+                slides: carried.slides,
                 offset: before.map_or(0.0, |before| before.offset),
                 steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
-                push: state.normal * (force * candidate.weight),
-                at: point.place - state.normal * (a.radius + 0.5 * gap),
+                push: (normal * force + point.traction()) * candidate.weight,
+                at: point.place - normal * (a.radius + 0.5 * gap),
             },
         }
     }
