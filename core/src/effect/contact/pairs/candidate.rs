@@ -19,9 +19,10 @@ const AT_NODE: f64 = 1e-6;
 pub(super) struct Side<const N: usize> {
     /// Places of its nodes
     pub nodes: [Vec3; N],
-    /// The derivative of the place at the start of the next element of the beam
+    /// The derivative of the place at the start of the next element of the beam; of the last element
+    /// of a ring, the first one
     pub next: Option<Vec3>,
-    /// True for the first element of the beam
+    /// True for the first element of a beam that is no ring
     pub is_first: bool,
     /// True if ends of the beam are half spheres, false if they do not touch
     pub has_caps: bool,

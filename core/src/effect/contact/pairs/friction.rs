@@ -65,9 +65,16 @@ impl<'a> PairsNow<'a> {
     /// element: the node nearest to the place of the point at the last converged state, or one in the
     /// middle.
     pub(super) fn carrier(&self, pair: &ListedPair, partner: Option<&PairPointMemory>) -> usize {
-        let order = self.pairs.both(pair.meeting as usize)[1].order;
+        let strand = self.pairs.both(pair.meeting as usize)[1];
+        let order = strand.order;
         let Some(partner) = partner else { return order.div_ceil(2) };
-        let along = (partner.on_second - f64::from(pair.elements[1])) * order as f64;
+        let mut along = partner.on_second - f64::from(pair.elements[1]);
+        if strand.is_closed() {
+            // The shorter way round from the middle of the element.
+            let count = strand.elements() as f64;
+            along -= count * ((along - 0.5) / count).round();
+        }
+        let along = along * order as f64;
         along.round().clamp(0.0, order as f64) as usize
     }
 

@@ -223,7 +223,7 @@ impl BeamPairs {
 
     /// The part of the force of each pair that closest points carry, by the angle between the
     /// chords of its elements: all of it where they cross, none where they are side by side.
-    fn blend(&self, list: &[ListedPair], places: &[Vec3]) -> Vec<f64> {
+    pub(super) fn blend(&self, list: &[ListedPair], places: &[Vec3]) -> Vec<f64> {
         let of_pair = |pair: &ListedPair| {
             let chord = |of: ElementOf| {
                 let nodes = self.of_element(of, places);

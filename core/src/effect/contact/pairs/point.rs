@@ -13,6 +13,7 @@ use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
 use crate::system::{ContactRegime, ListedPair, PairPointKind, PairPointMemory, PointMemory, State};
 use crate::tensor::{Mat3, Vec3};
+use std::borrow::Cow;
 
 /// Closest points nearer to each other than this part of an element, on both beams, are one contact.
 const SAME_PLACE: f64 = 0.9;
@@ -70,6 +71,8 @@ pub(super) struct PairsNow<'a> {
     /// The list, which is that of the state but in an assembly of another one
     pub list: &'a [ListedPair],
     places: Vec<Vec3>,
+    /// The part of the force of each pair of the list that closest points carry
+    blend: Cow<'a, [f64]>,
 }
 
 /// Calls a function of two numbers of nodes, for elements of given orders.
@@ -92,7 +95,10 @@ macro_rules! of_orders {
 impl<'a> PairsNow<'a> {
     pub fn new(pairs: &'a BeamPairs, laws: &'a [ContactLaws], at: &'a State, list: &'a [ListedPair]) -> Self {
         let places = if list.is_empty() { Vec::new() } else { pairs.places(at) };
-        Self { pairs, laws, at, list, places }
+        let known = &at.contacts.pairs;
+        let is_known = *list == **known.list && known.blend.len() == list.len();
+        let blend = if is_known { Cow::Borrowed(&known.blend[..]) } else { Cow::Owned(pairs.blend(list, &places)) };
+        Self { pairs, laws, at, list, places, blend }
     }
 
     /// Visits the points of all pairs that act, with their systems.
@@ -121,8 +127,7 @@ impl<'a> PairsNow<'a> {
         let mut found = Vec::new();
         for (number, pair) in (first..).zip(group) {
             if self.pairs.chord_gap(pair, &self.places) <= reach {
-                let blend = self.at.contacts.pairs.blend.get(number).copied().unwrap_or(1.0);
-                let candidates = self.candidates(pair, blend);
+                let candidates = self.candidates(pair, self.blend[number]);
                 found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
             }
         }
@@ -205,11 +210,12 @@ impl<'a> PairsNow<'a> {
             std::array::from_fn(|i| places[i])
         };
         let slope_at_start = |nodes: [Vec3; N]| weighted_sum(&ShapeAt::<N>::new(0.0).slopes, |i| nodes[i]);
-        let next = of.element + 1;
+        let is_closed = strand.is_closed();
+        let next = if is_closed { (of.element + 1) % strand.elements() } else { of.element + 1 };
         Side {
             nodes: nodes(of.element),
             next: (next < strand.elements()).then(|| slope_at_start(nodes(next))),
-            is_first: of.element == 0,
+            is_first: of.element == 0 && !is_closed,
             has_caps: strand.has_caps,
         }
     }
@@ -244,13 +250,15 @@ impl<'a> PairsNow<'a> {
             let orders = self.pairs.both(pair.meeting as usize).map(|strand| strand.order);
             of_orders!(orders, self.distance(pair, found.candidate.at))
         };
+        let Some(first) = found.first() else { return };
+        let strands = self.pairs.both(self.list[first.number].meeting as usize);
         let closest = |found: &&Found| found.candidate.kind == PairPointKind::Closest;
         let all: Vec<([f64; 2], f64)> =
             found.iter().filter(closest).map(|found| (along(found), distance(found))).collect();
         let is_beaten = |own: usize| {
             let (place, gap) = all[own];
             all.iter().enumerate().any(|(other, (at, less))| {
-                let is_near = place.iter().zip(at).all(|(a, b)| (a - b).abs() < SAME_PLACE);
+                let is_near = (0..2).all(|side| strands[side].shift(place[side], at[side]) < SAME_PLACE);
                 is_near && (*less < gap || (*less == gap && other < own))
             })
         };
@@ -266,7 +274,7 @@ impl<'a> PairsNow<'a> {
     pub fn is_among(&self, point: &PairPoint, memory: &[PairPointMemory]) -> bool {
         let first = memory.partition_point(|known| known.meeting < point.pair.meeting);
         let end = memory.partition_point(|known| known.meeting <= point.pair.meeting);
-        !links(&point.pair, &point.candidate, &memory[first..end]).is_empty()
+        !self.links(&point.pair, &point.candidate, &memory[first..end]).is_empty()
     }
 
     /// The number of the last point in memory of each candidate: the nearest ones first, each once.
@@ -274,7 +282,7 @@ impl<'a> PairsNow<'a> {
         let mut partner = vec![None; found.len()];
         let mut all: Vec<(f64, usize, usize)> = Vec::new();
         for (k, Found { number, candidate }) in found.iter().enumerate() {
-            let own = links(&self.list[*number], candidate, memory);
+            let own = self.links(&self.list[*number], candidate, memory);
             all.extend(own.into_iter().map(|(shift, j)| (shift, k, j)));
         }
         all.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
@@ -407,25 +415,31 @@ impl<'a> PairsNow<'a> {
             },
         }
     }
-}
 
-/// The points in memory that a candidate may have been, each with the distance of its place in
-/// elements.
-fn links(pair: &ListedPair, candidate: &PairCandidate, memory: &[PairPointMemory]) -> Vec<(f64, usize)> {
-    let along = [0, 1].map(|side| f64::from(pair.elements[side]) + candidate.at[side]);
-    let first = memory.partition_point(|point| point.point.place < along[0] - LARGEST_SHIFT);
-    let near = memory[first..].iter().take_while(|point| point.point.place <= along[0] + LARGEST_SHIFT);
-    let mut links = Vec::new();
-    for (j, point) in near.enumerate().filter(|(_, point)| point.kind == candidate.kind) {
-        let shifts = [point.point.place - along[0], point.on_second - along[1]].map(f64::abs);
-        let is_same = match candidate.kind {
-            PairPointKind::Closest => true,
-            PairPointKind::NodeOfFirst => shifts[0] == 0.0,
-            PairPointKind::NodeOfSecond => shifts[1] == 0.0,
-        };
-        if is_same && shifts[1] <= LARGEST_SHIFT {
-            links.push((shifts[0] + shifts[1], first + j));
+    /// The points in memory of a meeting that a candidate may have been, each with the distance of
+    /// its place in elements.
+    fn links(&self, pair: &ListedPair, candidate: &PairCandidate, memory: &[PairPointMemory]) -> Vec<(f64, usize)> {
+        let strands = self.pairs.both(pair.meeting as usize);
+        let along = [0, 1].map(|side| f64::from(pair.elements[side]) + candidate.at[side]);
+        // The memory is in the order of places; a ring goes on at its start.
+        let goes_round = strands[0].is_closed();
+        let is_before = |point: &PairPointMemory| !goes_round && point.point.place < along[0] - LARGEST_SHIFT;
+        let first = memory.partition_point(is_before);
+        let is_near = |point: &&PairPointMemory| goes_round || point.point.place <= along[0] + LARGEST_SHIFT;
+        let mut links = Vec::new();
+        for (j, point) in memory[first..].iter().take_while(is_near).enumerate() {
+            let places = [point.point.place, point.on_second];
+            let shifts = [0, 1].map(|side| strands[side].shift(places[side], along[side]));
+            let is_same = match candidate.kind {
+                PairPointKind::Closest => true,
+                PairPointKind::NodeOfFirst => shifts[0] == 0.0,
+                PairPointKind::NodeOfSecond => shifts[1] == 0.0,
+            };
+            let is_near = shifts.iter().all(|&shift| shift <= LARGEST_SHIFT);
+            if point.kind == candidate.kind && is_same && is_near {
+                links.push((shifts[0] + shifts[1], first + j));
+            }
         }
+        links
     }
-    links
 }

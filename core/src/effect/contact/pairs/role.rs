@@ -320,7 +320,7 @@ impl<'a> PairRole<'a> {
             let strands = self.pairs.meetings[point.meeting as usize].strands;
             for (side, place) in [point.point.place, point.on_second].into_iter().enumerate() {
                 if strands[side] == number {
-                    let near = (1.0 - (place * order - node).abs()).max(0.0);
+                    let near = (1.0 - order * strand.shift(place, node / order)).max(0.0);
                     forces[0] += point.weight * point.point.force * near;
                     forces[1] += point.weight * point.point.traction.norm() * near;
                 }
