@@ -1,6 +1,6 @@
 //! Contact points of listed pairs in a state, with their forces.
 
-use super::candidate::{PairCandidate, Side, candidates};
+use super::candidate::{PairCandidate, PointWeights, Side, candidates};
 use super::{BeamPairs, ElementOf};
 use crate::effect::contact::chain::LARGEST_SHIFT;
 use crate::effect::contact::laws::{ContactLaws, TOUCHING};
@@ -127,7 +127,8 @@ impl<'a> PairsNow<'a> {
         let mut found = Vec::new();
         for (number, pair) in (first..).zip(group) {
             if self.pairs.chord_gap(pair, &self.places) <= reach {
-                let candidates = self.candidates(pair, self.blend[number]);
+                let weights = PointWeights::new(self.blend[number], self.at.contacts.regime);
+                let candidates = self.candidates(pair, weights);
                 found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
             }
         }
@@ -191,15 +192,19 @@ impl<'a> PairsNow<'a> {
         ContactStiffness { augmented: in_series(a.augmented, b.augmented), penalty: in_series(a.penalty, b.penalty) }
     }
 
-    fn candidates(&self, pair: &ListedPair, blend: f64) -> Vec<PairCandidate> {
+    fn candidates(&self, pair: &ListedPair, weights: PointWeights) -> Vec<PairCandidate> {
         let orders = self.pairs.both(pair.meeting as usize).map(|strand| strand.order);
-        of_orders!(orders, self.candidates_of(pair, blend))
+        of_orders!(orders, self.candidates_of(pair, weights))
     }
 
-    fn candidates_of<const NA: usize, const NB: usize>(&self, pair: &ListedPair, blend: f64) -> Vec<PairCandidate> {
+    fn candidates_of<const NA: usize, const NB: usize>(
+        &self,
+        pair: &ListedPair,
+        weights: PointWeights,
+    ) -> Vec<PairCandidate> {
         let [a, b] = self.pairs.elements_of(pair);
         let mut out = Vec::new();
-        candidates(&self.side::<NA>(a), &self.side::<NB>(b), blend, &mut out);
+        candidates(&self.side::<NA>(a), &self.side::<NB>(b), weights, &mut out);
         out
     }
 
@@ -229,7 +234,7 @@ impl<'a> PairsNow<'a> {
         }
         let orders = strands.map(|strand| strand.order);
         let distance = |candidate: &PairCandidate| of_orders!(orders, self.distance(pair, candidate.at));
-        let distances = self.candidates(pair, 0.5).iter().map(distance).fold(f64::INFINITY, f64::min);
+        let distances = self.candidates(pair, PointWeights::ALL).iter().map(distance).fold(f64::INFINITY, f64::min);
         distances - strands[0].radius - strands[1].radius
     }
 
