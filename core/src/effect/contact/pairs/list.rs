@@ -189,11 +189,18 @@ impl BeamPairs {
     fn may_meet(&self, pair: &ListedPair, before: &[Vec3], after: &[Vec3]) -> bool {
         let [a, b] = self.both(pair.meeting as usize);
         let sag = self.sags(pair, before).max(self.sags(pair, after)) + a.radius + b.radius;
-        self.least_part(pair, before, after, sag) < 1.0
+        self.least_part(pair, before, after, [sag, f64::INFINITY]) < 1.0
     }
 
-    /// The part of a motion on which the chords of a pair stay apart by more than `sag`.
-    pub(super) fn least_part(&self, pair: &ListedPair, before: &[Vec3], after: &[Vec3], sag: f64) -> f64 {
+    /// The part of a motion on which the chords of a pair stay apart by more than a sag; see
+    /// [`safe_part`] for it and the distance that is enough.
+    pub(super) fn least_part(
+        &self,
+        pair: &ListedPair,
+        before: &[Vec3],
+        after: &[Vec3],
+        [sag, enough]: [f64; 2],
+    ) -> f64 {
         let mut part = 1.0f64;
         self.each_chords(pair, before, &mut |[i, j], segments| {
             let [of_a, of_b] = self.elements_of(pair).map(|of| self.of_element(of, after));
@@ -201,7 +208,7 @@ impl BeamPairs {
                 a: [of_a[i] - segments.a[0], of_a[i + 1] - segments.a[1]],
                 b: [of_b[j] - segments.b[0], of_b[j + 1] - segments.b[1]],
             };
-            part = part.min(safe_part(segments, &motion, sag));
+            part = part.min(safe_part(segments, &motion, sag, enough));
         });
         part
     }

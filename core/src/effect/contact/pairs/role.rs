@@ -210,7 +210,11 @@ impl<'a> PairRole<'a> {
             return turned;
         }
         let [before, after] = [from, to].map(|at| self.pairs.places(at));
-        let passes = |pair: &&ListedPair| self.pairs.least_part(pair, &before, &after, 0.0) < 1.0;
+        // A fast approach from far away may come near, but for a tenth of the distance in contact.
+        let passes = |pair: &&ListedPair| {
+            let [a, b] = self.pairs.both(pair.meeting as usize);
+            self.pairs.least_part(pair, &before, &after, [0.0, a.radius + b.radius]) < 1.0
+        };
         list.iter().filter(|pair| self.acts(pair, to)).find(passes).map(|pair| self.slot_of(pair))
     }
 
@@ -223,7 +227,7 @@ impl<'a> PairRole<'a> {
         let before = self.pairs.places(at);
         let nodes = self.pairs.strands.iter().flat_map(|strand| &strand.nodes);
         let after: Vec<Vec3> = nodes.zip(&before).map(|(node, x)| *x + increment[node.node.u as usize]).collect();
-        let part = |pair: &ListedPair| self.pairs.least_part(pair, &before, &after, 0.0);
+        let part = |pair: &ListedPair| self.pairs.least_part(pair, &before, &after, [0.0, f64::INFINITY]);
         list.iter().filter(|pair| self.acts(pair, at)).map(part).fold(1.0, f64::min)
     }
 
