@@ -329,7 +329,8 @@ impl<'a> ChainNow<'a> {
         let slides = state.status() == Status::Slides;
         let rotation = &self.carrier.rotation.r;
         let carried = if accepts {
-            CarriedTraction { force: state.traction.force, normal: state.normal, slides }
+            let now = CarriedTraction { force: state.traction.force, normal: state.normal, slides };
+            self.laws.carried(&law.normal, state.normal_force.force, now)
         } else {
             law.carried
         };

@@ -253,6 +253,10 @@ impl BeamPairs {
             let angle = libm::atan2(sine, a.dot(b).abs());
             let offset = spacing * sine / (strands[0].radius + strands[1].radius);
             let by_angle = smooth_part(angle, [SIDE_BY_SIDE, CROSSING]);
+            // The closest points of curved elements side by side may part into two.
+            if strands.iter().any(|strand| strand.order > 1) {
+                return by_angle;
+            }
             by_angle.max(smooth_part(offset, [SMALLEST_OFFSET, LARGEST_OFFSET]))
         };
         list.iter().map(of_pair).collect()

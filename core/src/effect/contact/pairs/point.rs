@@ -395,7 +395,9 @@ impl<'a> PairsNow<'a> {
             slides: known.point.slides,
         });
         let carried = if accepts {
-            CarriedTraction { force: point.traction(), normal, slides: state.status() == Status::Slides }
+            let slides = state.status() == Status::Slides;
+            let now = CarriedTraction { force: point.traction(), normal, slides };
+            self.laws[self.pairs.contact_of(pair.meeting as usize)].carried(&law.normal, force, now)
         } else {
             known
         };
