@@ -25,11 +25,11 @@ pub struct BeamElement<'m> {
 }
 
 impl BeamElement<'_> {
-    fn station(&self, xi: f64, gauss_weight: f64) -> Station {
-        let Part { piece, cover, .. } = self.beam.part_of_line(self.number);
+    fn station(&self, part: &Part, xi: f64, gauss_weight: f64) -> Station {
+        let &Part { piece, cover, .. } = part;
         let line = &self.beam.line;
         let (shape, slope) = shape_at(self.nodes.len(), xi);
-        let (tangent, jacobian) = line.pieces[piece].slope(self.between(&slope), cover);
+        let (tangent, jacobian) = line.pieces[piece].slope(|| self.between(&slope), cover);
         let t = cover.place(xi);
         let fraction = line.fraction(piece, t);
         Station {
@@ -86,7 +86,8 @@ impl ElementGeometry for BeamElement<'_> {
     }
 
     fn stations(&self, rule: Rule) -> Vec<Station> {
-        rule.points(self.nodes.len()).iter().map(|&(xi, weight)| self.station(xi, weight)).collect()
+        let part = self.beam.part_of_line(self.number);
+        rule.points(self.nodes.len()).iter().map(|&(xi, weight)| self.station(&part, xi, weight)).collect()
     }
 }
 
