@@ -11,6 +11,7 @@ mod figure;
 mod joints;
 mod memory;
 mod mesh;
+mod mesh_surface;
 mod names;
 mod output;
 mod path;
