@@ -8,12 +8,14 @@ mod chain;
 mod laws;
 mod pairs;
 mod resultant;
+mod shown;
 mod strand;
 mod surface;
 
 pub use chain::Chain;
 pub use laws::ContactLaws;
 pub use pairs::{BeamPairs, Meeting};
+pub use shown::NodeContact;
 pub use strand::{ChainNode, ContactStiffness, Strand};
 pub use surface::{SceneSurface, SurfaceCarrier};
 

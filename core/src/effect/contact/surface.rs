@@ -80,6 +80,13 @@ impl SceneSurface {
         self.surface.distance(place).ok().map(|distance| distance.value)
     }
 
+    /// Its rotation and its shift in a state: a point y of the surface is at R y + d.
+    pub fn pose(&self, at: &State) -> (Mat3, Vec3) {
+        let carrier = self.carrier(at, Weights::NONE);
+        let rotation = carrier.rotation.r;
+        (rotation, carrier.place - rotation * carrier.origin)
+    }
+
     /// The depth from which a point that penetrates still finds its way out; infinite for planes, and
     /// where beams are inside.
     pub(super) fn depth(&self) -> f64 {

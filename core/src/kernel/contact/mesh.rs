@@ -34,6 +34,12 @@ const MEASURED_FACES: usize = 2000;
 /// Faces are the two sides of a wall if the cosine between their normals is below this.
 const OPPOSITE: f64 = -0.5;
 
+/// Edges in a picture, about.
+const MOST_DRAWN: usize = 1500;
+
+/// Edges are drawn whose faces have normals with a cosine below this.
+const SHARP: f64 = 0.9;
+
 /// A closed triangle mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TriangleMesh {
@@ -240,6 +246,17 @@ impl TriangleMesh {
         let edge = self.parts.edges.get(number as usize)?;
         let normals = edge.faces.map(|face| self.parts.faces[face as usize].normal);
         Some((self.middle(edge), edge.along, 0.5 * edge.length, normals))
+    }
+
+    /// Its sharp edges, and some of the others, for pictures.
+    pub(super) fn outline(&self) -> Vec<[Vec3; 2]> {
+        let step = self.parts.edges.len().div_ceil(MOST_DRAWN).max(1);
+        let is_drawn = |number: usize, edge: &MeshEdge| {
+            let [a, b] = edge.faces.map(|face| self.parts.faces[face as usize].normal);
+            a.dot(b) < SHARP || (edge.bend != Bend::Flat && number.is_multiple_of(step))
+        };
+        let edges = self.parts.edges.iter().enumerate().filter(|(number, edge)| is_drawn(*number, edge));
+        edges.map(|(_, edge)| edge.ends.map(|end| self.parts.place(end))).take(2 * MOST_DRAWN).collect()
     }
 
     /// The smallest thickness of walls, measured at faces spread over the mesh; `otherwise` if none of

@@ -25,6 +25,7 @@ mod mesh_parts;
 mod mesh_tests;
 mod mesh_tree;
 pub mod minimum;
+mod outline;
 pub mod pair_search;
 pub mod point;
 pub mod surface;
