@@ -45,6 +45,7 @@ class Scene:
     rows: int = 6  # rows that are drawn, at equal parts of the history; 1: the last
     places: int = 60  # of each beam
     surfaces: list = field(default_factory=list)  # lines of points in space
+    balls: dict = field(default_factory=dict)  # radii of bodies by their nodes
 
 
 def circle(centre, radius, axes):
@@ -66,19 +67,24 @@ SCENES = {
         "contact/scenes/winch", ["cable"], view=oblique, rows=1, places=240,
         surfaces=[circle([0, y, 0], 0.1, (0, 2)) for y in (-0.02, 0.08)],
     ),
+    "gripper": Scene(
+        "contact/scenes/two_finger_gripper", ["left", "right"], rows=3, surfaces=[[[-0.1, 0, 0], [0.1, 0, 0]]], balls={"ball": 0.03},
+    ),
 }
 
 
 def history(scene, folder):
-    nodes = [f"{beam}@{k / scene.places:.10g}" for beam in scene.beams for k in range(scene.places + 1)]
+    nodes = [f"{beam}@{k / scene.places:.10g}" for beam in scene.beams for k in range(scene.places + 1)] + list(scene.balls)
     out = Path(folder) / "out"
     change = ["--set", f"output.nodes={nodes}", "--set", 'output.columns=["x"]']
     run = [BEAMSIM, "run", DECKS / f"{scene.deck}.toml", "--out", out, *change]
     subprocess.run(run, cwd=folder, check=True, capture_output=True)
     with open(out / "history.csv") as file:
         rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-    return [[[tuple(row[f"{beam}@{k / scene.places:.10g}.{axis}"] for axis in "xyz") for k in range(scene.places + 1)]
-             for beam in scene.beams] for row in rows]
+    place = lambda row, node: tuple(row[f"{node}.{axis}"] for axis in "xyz")
+    lines = lambda row: [[place(row, f"{beam}@{k / scene.places:.10g}") for k in range(scene.places + 1)] for beam in scene.beams]
+    balls = lambda row: [circle(place(row, node), radius, (0, 2)) for node, radius in scene.balls.items()]
+    return [lines(row) + balls(row) for row in rows]
 
 
 def draw(name, scene):

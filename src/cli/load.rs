@@ -171,20 +171,20 @@ fn absolute_path(deck: &Path, name: &str) -> PathBuf {
     std::fs::canonicalize(&path).or_else(|_| std::path::absolute(&path)).unwrap_or(path)
 }
 
-/// The text of a table that a deck names.
-fn beside(deck: &Path, name: &str) -> Result<String, Unreadable> {
+/// The content of a file that a deck names.
+fn beside(deck: &Path, name: &str) -> Result<Vec<u8>, Unreadable> {
     table(&path_beside(deck, name))
 }
 
-/// The text of a table. Only plain files are read: a deck from elsewhere must not make the program
+/// The content of a file beside a deck. Only plain files are read: a deck from elsewhere must not make the program
 /// wait for a device.
-pub fn table(path: &Path) -> Result<String, Unreadable> {
+pub fn table(path: &Path) -> Result<Vec<u8>, Unreadable> {
     let unreadable = |message: String| Unreadable { message, severity: Severity::File };
     let found = std::fs::metadata(path).map_err(|error| unreadable(OutputError::file(path, error).to_string()))?;
     if !found.is_file() {
         return Err(unreadable(format!("{}: not a plain file", path.display())));
     }
-    text(path).map_err(|error| {
+    bytes(path).map_err(|error| {
         let severity = match &error {
             CommandError::Deck(DeckError { fault: DeckFault::Limit, .. }) => Severity::Limit,
             CommandError::Io(_) => Severity::File,
@@ -224,8 +224,8 @@ fn check_parts(path: &Path, text: &str) -> Result<(), CommandError> {
     Err(CommandError::limit(message))
 }
 
-/// The text of a file.
-pub fn text(path: &Path) -> Result<String, CommandError> {
+/// The content of a file.
+fn bytes(path: &Path) -> Result<Vec<u8>, CommandError> {
     let io = |error: std::io::Error| OutputError::file(path, error);
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(io)?;
@@ -234,7 +234,12 @@ pub fn text(path: &Path) -> Result<String, CommandError> {
         let message = format!("{}: more bytes than the limit of {LARGEST_DECK}", path.display());
         return Err(CommandError::limit(message));
     }
-    String::from_utf8(bytes).map_err(|e| {
+    Ok(bytes)
+}
+
+/// The text of a file.
+pub fn text(path: &Path) -> Result<String, CommandError> {
+    String::from_utf8(bytes(path)?).map_err(|e| {
         let message = format!("{}: not UTF-8 text at byte {}", path.display(), e.utf8_error().valid_up_to());
         CommandError::deck(message)
     })

@@ -1,8 +1,9 @@
-//! Tables beside the deck: `{ csv = "spine.csv" }` is replaced by the rows of the file, so that all
-//! later steps have one whole text.
+//! Tables and meshes beside the deck: `{ csv = "spine.csv" }` is replaced by the rows of the file, and
+//! the triangles of mesh files follow at the end, so that all later steps have one whole text.
 
 use super::beam::StationsWord;
 use super::diagnostic::Severity;
+use super::mesh_file::Triangles;
 use super::{Diagnostic, Span, Words};
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 use xxhash_rust::xxh3::xxh3_64;
@@ -10,8 +11,8 @@ use xxhash_rust::xxh3::xxh3_64;
 /// Rows of a table, at most.
 const MOST_ROWS: usize = 1_000_000;
 
-/// Gives the text of a file that a deck names.
-pub type Open<'o> = &'o dyn Fn(&str) -> Result<String, Unreadable>;
+/// Gives the content of a file that a deck names.
+pub type Open<'o> = &'o dyn Fn(&str) -> Result<Vec<u8>, Unreadable>;
 
 /// Why a file that a deck names could not be read.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,28 +26,28 @@ pub struct Unreadable {
 /// The text of a deck, and the tables that it imports.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Imported {
-    /// The text with the rows of all tables. Lines keep their numbers; sections of a table follow at
-    /// the end.
+    /// The text with the rows of all tables. Lines keep their numbers; sections of a table and
+    /// triangles follow at the end.
     pub text: String,
     /// The tables, in the order in which they are read
     pub tables: Vec<ImportedTable>,
 }
 
-/// A table that a deck imports.
+/// A table or a mesh that a deck imports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedTable {
     /// Its path in the deck
     pub name: String,
-    /// The number of its rows
+    /// The number of its rows or triangles
     pub rows: usize,
     /// A fingerprint of the content of its file
     pub hash: String,
 }
 
-/// The fingerprint of a text: XXH3 of 64 bits. It finds files that have changed; it does not prove
+/// The fingerprint of a file: XXH3 of 64 bits. It finds files that have changed; it does not prove
 /// who wrote them.
-pub fn fingerprint(text: &str) -> String {
-    format!("xxh3:{:016x}", xxh3_64(text.as_bytes()))
+pub fn fingerprint(content: &[u8]) -> String {
+    format!("xxh3:{:016x}", xxh3_64(content))
 }
 
 /// Replaces everything that a deck imports by the rows of the files.
@@ -58,17 +59,26 @@ pub fn import(text: &str, open: Open) -> Result<Imported, Vec<Diagnostic>> {
 /// `most_rows`, whose names stay in the text.
 pub fn import_up_to(most_rows: usize, text: &str, open: Open) -> Result<Imported, Vec<Diagnostic>> {
     let unchanged = || Imported { text: text.into(), tables: Vec::new() };
-    if !text.contains("csv") {
+    if !text.contains("csv") && !text.contains("mesh") {
         return Ok(unchanged());
     }
     // A deck that is no TOML is reported when it is read.
     let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(unchanged()) };
-    let mut importer = Importer { text, open, most_rows, found: Vec::new(), sections: Vec::new(), tables: Vec::new() };
+    let mut importer = Importer {
+        text,
+        open,
+        most_rows,
+        found: Vec::new(),
+        sections: Vec::new(),
+        meshes: Vec::new(),
+        tables: Vec::new(),
+    };
     importer.beams(&mut document);
     importer.outlines(&mut document);
     importer.surfaces(&mut document);
     importer.histories(&mut document);
-    let Importer { found, sections, tables, .. } = importer;
+    importer.meshes(&mut document);
+    let Importer { found, sections, meshes, tables, .. } = importer;
     if !found.is_empty() {
         return Err(found);
     }
@@ -88,6 +98,12 @@ pub fn import_up_to(most_rows: usize, text: &str, open: Open) -> Result<Imported
             }
         }
     }
+    if !meshes.is_empty() {
+        let all = document.entry("mesh").or_insert(toml_edit::table());
+        if let Some(all) = all.as_table_like_mut() {
+            meshes.into_iter().for_each(|(name, mesh)| drop(all.insert(&name, Item::Table(mesh))));
+        }
+    }
     Ok(Imported { text: document.to_string(), tables })
 }
 
@@ -97,6 +113,8 @@ struct Importer<'a> {
     most_rows: usize,
     found: Vec<Diagnostic>,
     sections: Vec<(String, Item)>,
+    /// `[mesh.NAME]` by the names of files
+    meshes: Vec<(String, Table)>,
     tables: Vec<ImportedTable>,
 }
 
@@ -181,6 +199,28 @@ impl Importer<'_> {
         }
     }
 
+    /// Files of triangles; those that stand in the text already are not read again.
+    fn meshes(&mut self, document: &mut DocumentMut) {
+        let known = |path: &str| document.get("mesh").and_then(|meshes| meshes.get(path)).is_some();
+        let Some(surfaces) = document.get("surface").and_then(Item::as_array_of_tables) else { return };
+        let is_mesh = |surface: &&Table| surface.get("kind").and_then(Item::as_str) == Some("mesh");
+        let paths = surfaces.iter().filter(is_mesh).filter_map(|surface| surface.get("file")?.as_str());
+        let mut paths: Vec<String> = paths.filter(|path| !known(path)).map(str::to_string).collect();
+        paths.sort();
+        paths.dedup();
+        for path in paths {
+            let read = |content: &[u8]| {
+                let triangles = Triangles::read(&path, content)?;
+                Ok((triangles.encoded(), triangles.corners.len()))
+            };
+            if let Some(data) = self.file(&path, read) {
+                let mut mesh = Table::new();
+                mesh.insert("data", Item::Value(data.into()));
+                self.meshes.push((path, mesh));
+            }
+        }
+    }
+
     fn histories(&mut self, document: &mut DocumentMut) {
         let Some(histories) = document.get_mut("history").and_then(Item::as_table_like_mut) else { return };
         let names: Vec<String> = histories.iter().map(|(name, _)| name.to_string()).collect();
@@ -218,13 +258,22 @@ impl Importer<'_> {
         start..start + path.len()
     }
 
-    /// Reads a file; errors are reported at its name.
+    /// Reads a table of numbers; errors are reported at the name of its file.
     fn table<T>(&mut self, path: &str, of: impl Fn(&Csv) -> Result<T, String>) -> Option<T> {
         let wrong = |message: String| Unreadable { message, severity: Severity::Error };
+        self.file(path, |content| {
+            let not_text = |error: std::str::Utf8Error| format!("not UTF-8 text at byte {}", error.valid_up_to());
+            let text = std::str::from_utf8(content).map_err(|error| wrong(not_text(error)))?;
+            let table = Csv::read(text)?;
+            Ok((of(&table).map_err(wrong)?, table.rows.len()))
+        })
+    }
+
+    /// Reads a file, of which `of` gives the content and the number of rows; errors are reported at its
+    /// name.
+    fn file<T>(&mut self, path: &str, of: impl Fn(&[u8]) -> Result<(T, usize), Unreadable>) -> Option<T> {
         let read = (self.open)(path).and_then(|content| {
-            let table = Csv::read(&content)?;
-            let found = of(&table).map_err(wrong)?;
-            let rows = table.rows.len();
+            let (found, rows) = of(&content)?;
             Ok((found, ImportedTable { name: path.into(), rows, hash: fingerprint(&content) }))
         });
         match read {
@@ -524,7 +573,7 @@ mod tests {
     use super::*;
 
     fn with(text: &str, file: &str) -> Result<String, Vec<Diagnostic>> {
-        import(text, &|_| Ok(file.to_string())).map(|imported| imported.text)
+        import(text, &|_| Ok(file.into())).map(|imported| imported.text)
     }
 
     #[test]
@@ -629,11 +678,11 @@ mod tests {
     fn tables_are_known_by_rows_and_fingerprint() {
         let history = "[history.h]\ncsv = \"f.csv\"\n[history.g]\ncsv = \"f.csv\"\n";
         let imported = import(history, &|_| Ok("0,1\n1,2\n".into())).unwrap();
-        let table = ImportedTable { name: "f.csv".into(), rows: 2, hash: fingerprint("0,1\n1,2\n") };
+        let table = ImportedTable { name: "f.csv".into(), rows: 2, hash: fingerprint(b"0,1\n1,2\n") };
         assert_eq!(imported.tables, [table]);
         let short = import_up_to(1, history, &|_| Ok("0,1\n1,2\n".into())).unwrap();
         assert_eq!((short.text.as_str(), short.tables.len()), (history, 0));
-        assert_ne!(fingerprint("0,1\n1,2\n"), fingerprint("0,1\n1,3\n"));
+        assert_ne!(fingerprint(b"0,1\n1,2\n"), fingerprint(b"0,1\n1,3\n"));
     }
 
     #[test]

@@ -27,6 +27,7 @@ mod joint;
 mod layup;
 mod load;
 mod material;
+mod mesh_file;
 mod motion;
 mod observable;
 mod output;
@@ -69,6 +70,7 @@ pub use joint::{Joint, JointMotor, JointParts};
 pub use layup::{Layup, Ply};
 pub use load::{Frame, Load, LoadTarget, LoadVector};
 pub use material::{Elastic, Isotropic, Material, Strength};
+pub use mesh_file::{MeshTable, Triangles};
 pub use motion::{Motion, MotionWhat};
 pub use observable::{Looked, looking_at};
 pub use output::Output;
@@ -127,6 +129,8 @@ pub struct Deck {
     pub bodies: Vec<Body>,
     /// Springs and cables
     pub springs: Vec<Spring>,
+    /// Triangles of mesh files
+    pub meshes: Vec<MeshTable>,
     /// Rigid surfaces
     pub surfaces: Vec<Surface>,
     /// Contacts of beams and bodies with surfaces
@@ -162,10 +166,10 @@ pub struct Deck {
 }
 
 /// Keys of a deck.
-const KEYS: [&str; 27] = [
+const KEYS: [&str; 28] = [
     "title", "units", "gravity", "param", "point", "material", "layup", "section", "beam", "support", "motion",
-    "joint", "slider", "body", "spring", "surface", "contact", "load", "initial", "history", "stage", "effects",
-    "output", "cost", "accuracy", "damping", "expect",
+    "joint", "slider", "body", "spring", "mesh", "surface", "contact", "load", "initial", "history", "stage",
+    "effects", "output", "cost", "accuracy", "damping", "expect",
 ];
 
 /// Reads a deck. Errors and warnings are returned beside it, so that the scene can add its own;
@@ -275,6 +279,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         sliders: listed(&top, "slider", slider::read_slider),
         bodies,
         springs: listed(&top, "spring", spring::read_spring),
+        meshes: named(&top, "mesh", mesh_file::read_mesh),
         surfaces,
         contacts,
         loads: listed(&top, "load", load::read_load),

@@ -254,6 +254,7 @@ mod tests {
             ("load.history", deck::history::USE_KEYS.to_vec()),
             ("material", deck::material::KEYS.to_vec()),
             ("material.strength", deck::material::STRENGTH_KEYS.to_vec()),
+            ("mesh", deck::mesh_file::KEYS.to_vec()),
             ("motion", deck::motion::KEYS.to_vec()),
             ("motion.history", deck::history::USE_KEYS.to_vec()),
             ("output", deck::output::KEYS.to_vec()),

@@ -102,6 +102,17 @@ pub enum SurfaceBody {
         /// One radius, or one for each point
         radii: Spanned<Vec<f64>>,
     },
+    /// A triangle mesh
+    Mesh {
+        /// The file of its triangles
+        file: Spanned<String>,
+        /// Length of the deck over length of the file
+        scale: f64,
+        /// The place of the origin of the file; left out: the origin
+        at: Option<SurfacePoint>,
+        /// The directions of the axes of the file; left out: the global axes
+        axes: Option<Axes>,
+    },
 }
 
 /// A prescribed motion of a surface.
@@ -139,6 +150,8 @@ words! {
         Box = "box",
         /// Tube along a curve
         Tube = "tube",
+        /// Triangle mesh from a file
+        Mesh = "mesh",
     }
 }
 
@@ -162,19 +175,21 @@ impl SurfaceWord {
             Self::Torus => &["at", "axis", "ring", "radius", "side"],
             Self::Box => &["at", "half", "axes", "side"],
             Self::Tube => &["through", "arc", "smooth", "radius", "side"],
+            Self::Mesh => &["file", "scale", "at", "axes", "side"],
         }
     }
 }
 
 /// Keys that belong to some shapes only.
-const SHAPE_KEYS: [&str; 14] = [
-    "point", "normal", "at", "radius", "from", "to", "axis", "ring", "half", "axes", "through", "arc", "smooth", "side",
+const SHAPE_KEYS: [&str; 16] = [
+    "point", "normal", "at", "radius", "from", "to", "axis", "ring", "half", "axes", "through", "arc", "smooth",
+    "file", "scale", "side",
 ];
 
 /// Keys of `[[surface]]`.
-pub(super) const KEYS: [&str; 23] = [
+pub(super) const KEYS: [&str; 25] = [
     "name", "kind", "point", "normal", "at", "radius", "from", "to", "axis", "ring", "half", "axes", "through", "arc",
-    "smooth", "side", "on", "move", "rotate", "about", "angle", "history", "stages",
+    "smooth", "file", "scale", "side", "on", "move", "rotate", "about", "angle", "history", "stages",
 ];
 
 pub(super) fn read_surface<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Surface> {
@@ -262,6 +277,13 @@ fn read_body(table: &Table, kind: SurfaceWord) -> Option<SurfaceBody> {
             Some(SurfaceBody::Box { at: at?, half: half.value, axes: axes? })
         }
         SurfaceWord::Tube => read_tube(table),
+        SurfaceWord::Mesh => {
+            let file = table.required_text("file");
+            let scale = table.positive_or("scale", 1.0);
+            let at = table.optional("at", read_point);
+            let axes = read_axes(table);
+            Some(SurfaceBody::Mesh { file: file?, scale: scale?, at: at?, axes: axes? })
+        }
     }
 }
 

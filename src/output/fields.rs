@@ -192,6 +192,10 @@ fn grid(figure: &Figure, stage: usize, state: &State, origin: Option<&State>) ->
     if let Some(stress) = figure.von_mises(&looks) {
         grid.floats("vm", 1, stress.into_iter());
     }
+    if let Some(contacts) = figure.contacts_at(state) {
+        grid.floats("gap", 1, contacts.iter().map(|(gap, _)| *gap));
+        grid.floats("contact_force", 3, contacts.iter().flat_map(|(_, force)| force.0));
+    }
     grid.tag("</PointData>\n<CellData>");
     grid.array("beam", "Int32", 1, cells.beams.iter().flat_map(|beam| beam.to_le_bytes()).collect());
     grid.tag("</CellData>\n<Cells>");

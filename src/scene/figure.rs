@@ -1,6 +1,7 @@
 //! The shape of a scene, for pictures.
 
 use super::mesh::{Mesh, MeshBeam};
+use beamsim_core::effect::contact::SurfaceContacts;
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::Link;
@@ -21,6 +22,7 @@ pub fn figure(
     links: &[Link],
     elasticity: &[Arc<dyn StressField>],
     sections: &SectionsAtNodes,
+    contacts: Option<Arc<SurfaceContacts>>,
 ) -> Figure {
     let section = |number: usize, k: usize| sections.get(number).and_then(|beam| beam[k].clone());
     let line = |(number, beam): (usize, &MeshBeam)| Line {
@@ -34,6 +36,7 @@ pub fn figure(
         lines: mesh.beams.iter().enumerate().map(line).collect(),
         bodies: bodies.iter().map(|body| bare(body.node, body.place)).collect(),
         links: links.iter().map(ends).collect(),
+        contacts,
     }
 }
 

@@ -11,6 +11,7 @@ mod figure;
 mod joints;
 mod memory;
 mod mesh;
+mod mesh_surface;
 mod names;
 mod output;
 mod path;
@@ -33,6 +34,7 @@ pub use stress::recovery as section_stresses;
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, Severity, Spanned, StageBody, Target, Words, words,
 };
+use beamsim_core::effect::contact::SurfaceContacts;
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
@@ -80,6 +82,8 @@ pub struct Scene {
     pub resolved: serde_json::Value,
     /// Beam elasticity, the source of stress resultants
     elasticity: Vec<Arc<dyn StressField>>,
+    /// Surfaces and contacts, for pictures
+    contacts: Option<Arc<SurfaceContacts>>,
     /// Sections whose stresses fields show; empty where no stresses are wanted
     sections_at_nodes: SectionsAtNodes,
 }
@@ -87,7 +91,8 @@ pub struct Scene {
 impl Scene {
     /// Its whole shape, for pictures.
     pub fn figure(&self) -> Figure {
-        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity, &self.sections_at_nodes)
+        let contacts = self.contacts.clone();
+        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity, &self.sections_at_nodes, contacts)
     }
 
     /// All texts of the deck that may name a place on a beam.
@@ -359,6 +364,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         links: composition.links,
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
+        contacts: composition.contacts,
         sections_at_nodes,
     })
 }

@@ -1,6 +1,7 @@
 //! Rigid surfaces: from tables of the deck to shapes.
 
 use super::constraints::axes;
+use super::mesh_surface::mesh;
 use super::names;
 use crate::deck::{self, Deck, Diagnostic, SideWord, Spanned, SurfaceBody, TubeLine};
 use beamsim_core::kernel::contact::{Cone, Shape, Side, Surface, Tube, TubeEnds, TubeError};
@@ -48,6 +49,10 @@ fn shape(deck: &Deck, table: &deck::Surface) -> Result<Shape, Diagnostic> {
             Ok(Shape::Box { centre: place(at)?, axes: axes(*directions), half: *half })
         }
         SurfaceBody::Tube { line, smooth, radii } => tube(deck, table, line, *smooth, radii),
+        SurfaceBody::Mesh { file, scale, at, axes: directions } => {
+            let at = at.as_ref().map_or(Ok(Vec3::ZERO), place)?;
+            mesh(deck, file, at, axes(*directions) * *scale).map(Shape::Mesh)
+        }
     }
 }
 

@@ -53,8 +53,8 @@ pub fn whole_text(input: &Input, corpus: &Corpus) -> Result<String, Verdict> {
         if named { Verdict::Refused } else { Verdict::Fault(format!("no name in an error of --set: {message}")) }
     })?;
     let open = |name: &str| match (&input.table, corpus.table(name)) {
-        (Some(table), _) if name == TABLE => Ok(table.clone()),
-        (_, Some(table)) => Ok(table.to_string()),
+        (Some(table), _) if name == TABLE => Ok(table.clone().into()),
+        (_, Some(table)) => Ok(table.into()),
         (_, None) => {
             let message = "there is no such file".into();
             Err(Unreadable { message, severity: Severity::File })

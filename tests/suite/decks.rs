@@ -1,5 +1,6 @@
 //! Every deck in `decks/` holds its own expectations.
 
+use beamsim::deck::{Severity, Unreadable};
 use beamsim::scene;
 use beamsim::study::{Recorder, judge};
 use beamsim_core::run::{Failure, Observer, Run, Snapshot, StageResult};
@@ -29,8 +30,16 @@ pub fn decks(folder: &str) -> Vec<PathBuf> {
     decks
 }
 
-fn verify(path: &Path) -> Vec<String> {
+/// The text of a deck with the tables and meshes beside it.
+fn whole_text(path: &Path) -> String {
     let text = std::fs::read_to_string(path).unwrap();
+    let unreadable = |error: std::io::Error| Unreadable { message: error.to_string(), severity: Severity::File };
+    let beside = |name: &str| std::fs::read(path.with_file_name(name)).map_err(unreadable);
+    beamsim::deck::import(&text, &beside).map_or(text.clone(), |imported| imported.text)
+}
+
+fn verify(path: &Path) -> Vec<String> {
+    let text = whole_text(path);
     let name = path.display();
     let scene = match scene::from_text(&text) {
         Ok((scene, _)) => scene,
@@ -148,4 +157,5 @@ fn minimal_decks_hold() {
 #[test]
 fn contacts_hold() {
     all_hold("decks/contact", 9);
+    all_hold("decks/contact/meshes", 2);
 }

@@ -19,7 +19,7 @@ const DECK_ROWS: [&str; 2] = ["beamsim_core::effect::joint::JointKind", "beamsim
 const BELOW_ALL: [&str; 2] = ["failure", "warning"];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 19] = [
+const CRATES: [(&str, &[&str]); 22] = [
     ("rayon", &["core/src/threads.rs"]),
     (
         "faer",
@@ -60,6 +60,9 @@ const CRATES: [(&str, &[&str]); 19] = [
     ("postcard", &["src/output/checkpoint.rs"]),
     ("xxhash_rust", &["src/output/", "src/deck/import.rs"]),
     ("thiserror", &["src/output/", "src/study/", "src/cli/"]),
+    ("base64", &["src/output/report/", "src/deck/mesh_file.rs"]),
+    ("stl_io", &["src/deck/mesh_file.rs"]),
+    ("tobj", &["src/deck/mesh_file.rs"]),
 ];
 
 /// Files that may import one another, and why.

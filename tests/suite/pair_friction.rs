@@ -177,8 +177,11 @@ fn no_friction_is_friction_left_out() {
     assert_eq!(with.counters.work.iterations, without.counters.work.iterations);
 }
 
+/// An assembly, a state of it, and force and moment about the origin of each node.
+type Rubbing = (Assembly, State, Vec<(Vec3, Vec3)>);
+
 /// A state of two beams in contact, with a memory of friction, after a small random motion.
-fn rubbing(random: &mut Random) -> Option<(Assembly, State, Vec<(Vec3, Vec3)>)> {
+fn rubbing(random: &mut Random) -> Option<Rubbing> {
     let dragged = Dragged::random(random);
     let text = dragged.deck().replace("name = \"c\"", "name = \"c\"\nstiffness = 3\nstick = 2");
     let (scene, _) = scene::from_text(&text).unwrap();

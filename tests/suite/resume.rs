@@ -137,7 +137,7 @@ fn decks(folder: &Path, found: &mut Vec<PathBuf>) {
 fn scene_of(path: &Path) -> Option<Scene> {
     let text = std::fs::read_to_string(path).unwrap();
     let unreadable = |error: std::io::Error| Unreadable { message: error.to_string(), severity: Severity::File };
-    let beside = |name: &str| std::fs::read_to_string(path.with_file_name(name)).map_err(unreadable);
+    let beside = |name: &str| std::fs::read(path.with_file_name(name)).map_err(unreadable);
     let imported = beamsim::deck::import(&text, &beside).ok()?;
     scene::from_text(&imported.text).ok().map(|(scene, _)| scene)
 }

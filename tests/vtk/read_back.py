@@ -57,9 +57,21 @@ steps = 2
 kind = "dynamic"
 end = 0.2
 step = 0.02
+[[surface]]
+name = "pad"
+kind = "sphere"
+at = [2.2, 1, 1]
+radius = 1
+[[contact]]
+name = "stop"
+nodes = ["tip"]
+beams = ["post"]
+surfaces = ["pad"]
+radius = 0.199
+stiffness = 1e3
 [output]
 nodes = [NODES]
-columns = ["x", "u", "r", "d", "v", "resultant", "strain"]
+columns = ["x", "u", "r", "d", "v", "resultant", "strain", "contact"]
 every = 3
 vtk = true
 """
@@ -113,11 +125,25 @@ def hold(grid, row, counts):
         # On the arc the axes of the Gauss points are not those of the node: strains and resultants are extrapolated each for itself.
         tolerance = 1e-2 if node.startswith("arc") else 1e-10
         close(data.GetArray("strain_energy_per_length").GetValue(k), energy, f"{node} energy", tolerance)
+    hold_contacts(data, row)
     cells = [grid.GetCellType(k) for k in range(grid.GetNumberOfCells())]
     if cells != CELLS:
         raise SystemExit(f"cells {cells}, not {CELLS}")
     for name, column in (("TimeValue", "time"), ("load", "load"), ("stage", "stage")):
         close(grid.GetFieldData().GetArray(name).GetValue(0), float(row[column]), name)
+
+
+def hold_contacts(data, row):
+    """The forces at all nodes have the resultant of the history, and the least gap at nodes is not below that of all points."""
+    force, gap = data.GetArray("contact_force"), data.GetArray("gap")
+    nodes = range(force.GetNumberOfTuples())
+    # The body is a point of its own at the place of the last node.
+    own = [k for k in nodes if k != len(POINTS)]
+    for axis, name in enumerate(("fx", "fy", "fz")):
+        close(sum(force.GetTuple(k)[axis] for k in own), float(row[f"stop.{name}"]), name, 1e-9)
+    gaps = [gap.GetValue(k) for k in nodes if not math.isnan(gap.GetValue(k))]
+    if len(gaps) != 6 or min(gaps) < float(row["stop.gap"]) - 1e-12:
+        raise SystemExit(f"gaps {gaps}, least {row['stop.gap']}")
 
 
 def check_curve(grid):

@@ -2,11 +2,13 @@
 //! strains and resultants.
 
 use super::place::{BeamPoint, Place};
+use crate::effect::contact::SurfaceContacts;
 use crate::rotation::{Rotation, principal};
 use crate::section::Vector6;
 use crate::section::recovery::{Measure, PlacedRecovery};
 use crate::system::State;
 use crate::tensor::{Mat3, Vec3};
+use std::sync::Arc;
 
 /// The shape of a scene.
 #[derive(Clone, Default)]
@@ -17,6 +19,8 @@ pub struct Figure {
     pub bodies: Vec<Place>,
     /// Ends of springs and cables between nodes
     pub links: Vec<[Place; 2]>,
+    /// Surfaces and contacts, if there are some
+    pub contacts: Option<Arc<SurfaceContacts>>,
 }
 
 /// A beam.
@@ -88,6 +92,24 @@ impl Figure {
         let mut values: Vec<f64> = points().zip(looks).map(of_point).collect();
         values.resize(looks.len(), f64::NAN);
         Some(values)
+    }
+
+    /// The gap and the force (global components) of contacts at each look; not a number where nothing
+    /// is there to touch. `None` without contacts.
+    pub fn contacts_at(&self, state: &State) -> Option<Vec<(f64, Vec3)>> {
+        let nodes = self.contacts.as_ref()?.at_nodes(state);
+        let of_place = |place: &Place| {
+            let contact = place.node().and_then(|node| nodes.get(&node.u));
+            let gap = contact.map_or(f64::NAN, |contact| contact.gap);
+            (if gap.is_finite() { gap } else { f64::NAN }, contact.map_or(Vec3::ZERO, |contact| contact.force))
+        };
+        Some(self.places().map(of_place).collect())
+    }
+
+    /// The places of all looks.
+    pub fn places(&self) -> impl Iterator<Item = &Place> {
+        let points = self.lines.iter().flat_map(|line| line.points.iter().map(|point| &point.place));
+        points.chain(&self.bodies).chain(self.links.as_flattened())
     }
 
     /// Number of nodes of beams.

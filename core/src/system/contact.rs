@@ -80,8 +80,9 @@ pub struct ChainMemory {
 pub struct PointMemory {
     /// Its place: the number of its element plus the part of that element before it
     pub place: f64,
-    /// The number of the edge of a box that it touches; otherwise it touches the whole surface
-    pub edge: Option<u8>,
+    /// The number of the edge of a box or a mesh that it touches; otherwise it touches the whole
+    /// surface
+    pub edge: Option<u32>,
     /// p, the normal force
     pub force: f64,
     /// L of the next evaluation in static stages, with which the force of an accepted state is p

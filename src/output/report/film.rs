@@ -3,10 +3,12 @@
 use super::super::{Row, Units};
 use super::encode::{base64, quantised};
 use crate::scene::Scene;
+use beamsim_core::effect::contact::SceneSurface;
+use beamsim_core::kernel::contact::Shape;
 use beamsim_core::model::SlotKind;
 use beamsim_core::probe::{Figure, Look, Place};
 use beamsim_core::run::Snapshot;
-use beamsim_core::system::{Node, State};
+use beamsim_core::system::{Node, Slot, State};
 use beamsim_core::tensor::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -116,6 +118,10 @@ struct Frame {
     places: Vec<[f32; 3]>,
     turns: Vec<[i16; 4]>,
     fields: Vec<[f32; 7]>,
+    /// Rotation by rows and shift of each surface
+    poses: Vec<[f32; 12]>,
+    /// Place and force of each contact point
+    forces: Vec<[f32; 6]>,
 }
 
 impl Film {
@@ -177,12 +183,20 @@ impl Film {
     fn frame(&self, row: usize, state: &State, origin: Option<&State>) -> Frame {
         let looks = self.figure.looks(state, origin);
         let of = || self.shown.iter().flatten().map(|&k| &looks[k]);
+        let contacts = &self.figure.contacts;
         Frame {
             row,
             places: of().map(|look| look.place.0.map(|x| x as f32)).collect(),
             turns: of().map(|look| quaternion(look.axes)).collect(),
             fields: of().map(fields).collect(),
+            poses: self.surfaces().iter().map(|surface| pose(surface, state)).collect(),
+            forces: contacts.iter().flat_map(|contacts| contacts.forces(state)).map(force).collect(),
         }
+    }
+
+    /// The surfaces of the scene.
+    fn surfaces(&self) -> &[SceneSurface] {
+        self.figure.contacts.as_ref().map_or(&[], |contacts| &contacts.surfaces)
     }
 
     /// Drops every other frame where there are too many.
@@ -211,23 +225,31 @@ impl Film {
     /// As the page takes it; `row` gives the number of a row of the history among those that are shown.
     pub fn to_json(&self, row: &dyn Fn(usize) -> usize, units: &Units) -> Value {
         let places = initial(&self.figure, &self.shown);
+        let radii: Vec<(Slot, f64)> = self.figure.contacts.iter().flat_map(|contacts| contacts.radii()).collect();
+        let radius = |of: Option<&(Node, Vec3)>| {
+            let (node, _) = of?;
+            radii.iter().find(|(slot, _)| *slot == node.u).map(|(_, radius)| *radius)
+        };
         let mut first = 0;
         let mut beams = Vec::new();
         for (line, shown) in self.figure.lines.iter().zip(&self.shown) {
             // Of a thinned beam elements are not whole.
             let order = if shown.len() == line.points.len() { line.order } else { 1 };
-            beams.push(json!({ "name": line.name, "nodes": (first..first + shown.len()).collect::<Vec<_>>(), "order": order, "closed": false }));
+            let nodes: Vec<usize> = (first..first + shown.len()).collect();
+            let radius = radius(places.get(first));
+            beams.push(json!({ "name": line.name, "nodes": nodes, "order": order, "closed": false, "radius": radius }));
             first += shown.len();
         }
         let nodes = |all: &[usize]| all.iter().map(|node| json!({ "node": node })).collect::<Vec<_>>();
-        let bodies: Vec<usize> = (first..first + self.figure.bodies.len()).collect();
+        let body = |k: usize| json!({ "node": k, "radius": radius(places.get(k)) });
+        let bodies: Vec<Value> = (first..first + self.figure.bodies.len()).map(body).collect();
         let ends: Vec<usize> = (first + bodies.len()..places.len()).collect();
         let frames = || self.reel.frames.iter();
         json!({
             "nodes": places.len(),
             "names": self.names.iter().map(|(name, node)| json!({ "name": name, "node": node })).collect::<Vec<_>>(),
             "beams": beams,
-            "bodies": nodes(&bodies),
+            "bodies": bodies,
             "links": ends.as_chunks::<2>().0,
             "supports": nodes(&self.supports),
             "joints": nodes(&self.joints),
@@ -236,7 +258,34 @@ impl Film {
             "places": base64(frames().flat_map(|frame| frame.places.as_flattened()).flat_map(|x| x.to_le_bytes())),
             "turns": base64(frames().flat_map(|frame| frame.turns.as_flattened()).flat_map(|x| x.to_le_bytes())),
             "fields": self.fields(units),
+            "contacts": self.contacts(&places),
             "events": self.reel.events.iter().map(|event| at_row(event, row)).collect::<Vec<_>>(),
+        })
+    }
+
+    /// Surfaces, how they move, and the forces of contacts; null in scenes without them.
+    fn contacts(&self, places: &[(Node, Vec3)]) -> Value {
+        if self.figure.contacts.is_none() {
+            return Value::Null;
+        }
+        let middle =
+            places.iter().fold(Vec3::ZERO, |sum, (_, place)| sum + *place) * (1.0 / places.len().max(1) as f64);
+        let reach = places.iter().map(|(_, place)| (*place - middle).norm()).fold(0.0, f64::max);
+        let reach = if reach > 0.0 { 1.2 * reach } else { 1.0 };
+        let surface = |surface: &SceneSurface| {
+            let lines = surface.surface.outline(middle, reach);
+            let counts: Vec<usize> = lines.iter().map(Vec::len).collect();
+            let numbers = lines.iter().flatten().flat_map(|point| point.0).flat_map(|x| (x as f32).to_le_bytes());
+            let is_endless = matches!(surface.surface.shape, Shape::Plane { .. } | Shape::Cylinder { .. });
+            json!({ "name": surface.name, "counts": counts, "lines": base64(numbers), "endless": is_endless })
+        };
+        let frames = || self.reel.frames.iter();
+        let bytes = |numbers: &[f32]| numbers.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+        json!({
+            "surfaces": self.surfaces().iter().map(surface).collect::<Vec<_>>(),
+            "poses": base64(frames().flat_map(|frame| bytes(frame.poses.as_flattened()))),
+            "counts": frames().map(|frame| frame.forces.len()).collect::<Vec<_>>(),
+            "forces": base64(frames().flat_map(|frame| bytes(frame.forces.as_flattened()))),
         })
     }
 
@@ -259,6 +308,21 @@ impl Film {
         }
         shown
     }
+}
+
+/// Rotation by rows and shift of a surface.
+fn pose(surface: &SceneSurface, state: &State) -> [f32; 12] {
+    let (rotation, shift) = surface.pose(state);
+    let [a, b, c] = rotation.0;
+    let mut all = [a, b, c, shift.0].concat().into_iter().map(|x| x as f32);
+    std::array::from_fn(|_| all.next().unwrap_or_default())
+}
+
+/// Place and force of a contact point.
+fn force([place, push]: [Vec3; 2]) -> [f32; 6] {
+    let [x, y, z] = place.0;
+    let [fx, fy, fz] = push.0;
+    [x, y, z, fx, fy, fz].map(|x| x as f32)
 }
 
 /// The nodes whose place is held.
@@ -314,13 +378,7 @@ fn shown(figure: &Figure, named: &[(String, Place)]) -> Vec<Vec<usize>> {
 
 /// Node and place at the start of what is shown.
 fn initial(figure: &Figure, shown: &[Vec<usize>]) -> Vec<(Node, Vec3)> {
-    let places: Vec<&Place> = figure
-        .lines
-        .iter()
-        .flat_map(|line| line.points.iter().map(|point| &point.place))
-        .chain(&figure.bodies)
-        .chain(figure.links.as_flattened())
-        .collect();
+    let places: Vec<&Place> = figure.places().collect();
     shown.iter().flatten().filter_map(|&k| Some((places[k].node()?, places[k].initial()))).collect()
 }
 

@@ -20,6 +20,7 @@ use beamsim_core::run::Driven;
 use beamsim_core::system::Slot;
 use beamsim_core::tensor::Vec3;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// The largest penetration of contacts that name none, over the radius.
 const PENETRATION: f64 = 1e-3;
@@ -66,7 +67,7 @@ impl Composer<'_> {
         let Some(surfaces) = surfaces.into_iter().collect::<Option<Vec<_>>>() else { return };
         out.surfaces = surfaces;
         let rubs = out.laws.iter().any(ContactLaws::rubs);
-        let reason = reason_of(deck.contacts.len(), &out);
+        let reason = reason_of(deck, &out);
         if rubs {
             self.reason(FRICTION, true, "`friction` in [[contact]]");
         } else if deck.effects.allow(EffectWord::Friction) {
@@ -74,7 +75,10 @@ impl Composer<'_> {
         } else {
             self.reason(FRICTION, false, super::SWITCHED_OFF);
         }
-        self.push(out, reason);
+        let out = Arc::new(out);
+        self.reason(NAME, true, reason);
+        self.out.contacts = Some(out.clone());
+        self.out.effects.push(out);
     }
 
     /// The slots of displacement of nodes that joints connect.
@@ -326,11 +330,16 @@ impl Composer<'_> {
 }
 
 /// The reason of contacts, with what may touch what.
-fn reason_of(tables: usize, out: &SurfaceContacts) -> String {
-    let mut parts = Vec::new();
+fn reason_of(deck: &Deck, out: &SurfaceContacts) -> String {
+    let with_surfaces = deck.contacts.iter().filter(|contact| !contact.surfaces.is_empty());
+    let meets = |contact: &deck::Contact| {
+        let parties = listed(contact.beams.iter().chain(&contact.nodes));
+        format!("{parties} with {}", listed(contact.surfaces.iter()))
+    };
+    let mut parts: Vec<String> = with_surfaces.map(meets).take(NAMED_MEETINGS).collect();
     let elements: usize = out.chains.iter().map(|chain| chain.elements()).sum();
     if elements > 0 {
-        parts.push(format!("{elements} pair(s) of an element or a body with a surface"));
+        parts.push(format!("{elements} pair(s) of an element or a body with a surface in all"));
     }
     if !out.pairs.is_empty() {
         let meets = |[a, b]: [&str; 2]| if a == b { format!("{a} with itself") } else { format!("{a} with {b}") };
@@ -345,7 +354,36 @@ fn reason_of(tables: usize, out: &SurfaceContacts) -> String {
              share or a joint)"
         ));
     }
-    format!("{tables} [[contact]] table(s): {}", parts.join(", "))
+    let idle = idle_names(deck);
+    if !idle.is_empty() {
+        parts.push(format!("no [[contact]] names {}", listed(idle.into_iter())));
+    }
+    format!("{} [[contact]] table(s): {}", deck.contacts.len(), parts.join("; "))
+}
+
+/// Names one after the other, the first of many.
+fn listed<'a>(names: impl Iterator<Item = &'a Spanned<String>>) -> String {
+    let names: Vec<&str> = names.map(|name| name.value.as_str()).collect();
+    let more = names.len().saturating_sub(NAMED_MEETINGS);
+    let shown = names[..names.len() - more].join(", ");
+    if more == 0 { shown } else { format!("{shown} and {more} more") }
+}
+
+/// Beams, bodies and surfaces that touch nothing, since no contact names them.
+fn idle_names(deck: &Deck) -> Vec<&Spanned<String>> {
+    let of_contact = |contact: &deck::Contact| {
+        let parties = [&contact.beams, &contact.nodes, &contact.with, &contact.surfaces].into_iter().flatten();
+        parties.map(|name| name.value.clone()).collect::<Vec<_>>()
+    };
+    let named: Vec<String> = deck.contacts.iter().flat_map(of_contact).collect();
+    let beams = deck.beams.iter().map(|beam| &beam.name);
+    let bodies = deck.bodies.iter().map(|body| &body.at);
+    // A body that carries a surface touches with that.
+    let carriers: Vec<&str> =
+        deck.surfaces.iter().filter_map(|surface| Some(surface.on.as_ref()?.value.as_str())).collect();
+    let bodies = bodies.filter(|body| !carriers.contains(&body.value.as_str()));
+    let surfaces = deck.surfaces.iter().map(|surface| &surface.name);
+    beams.chain(bodies).chain(surfaces).filter(|name| !named.contains(&name.value)).collect()
 }
 
 /// The shortest time step that dynamic stages of a deck begin with.

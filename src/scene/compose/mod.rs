@@ -16,6 +16,7 @@ use super::mesh::{BeamElement, Mesh};
 use super::output::needs;
 use crate::deck::{self, Damping, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
 use beamsim_core::effect::Effect;
+use beamsim_core::effect::contact::SurfaceContacts;
 use beamsim_core::effect::elasticity::{ElasticElements, RotationInterpolation, StressField, Viscosity};
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
@@ -63,6 +64,8 @@ pub struct Composition {
     pub amplitudes: Vec<Amplitude>,
     /// The elasticity, for resultants
     pub elasticity: Vec<Arc<dyn StressField>>,
+    /// Surfaces and contacts, for pictures
+    pub contacts: Option<Arc<SurfaceContacts>>,
     /// Rigid bodies
     pub bodies: Vec<Body>,
     /// Springs and cables between nodes
@@ -119,6 +122,7 @@ pub fn compose(
         reasons: Vec::new(),
         amplitudes: Vec::new(),
         elasticity: Vec::new(),
+        contacts: None,
         bodies: Vec::new(),
         links: Vec::new(),
         springs: Vec::new(),

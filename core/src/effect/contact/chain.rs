@@ -1,12 +1,13 @@
 //! A beam or a body against one surface: its nodes, and its candidates for contact.
 //!
 //! The candidates of a state are the closest points between the ends of elements
-//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. At a box the closest
-//! points to its edges are candidates as well ([`crate::kernel::contact::edge`]). Elements from
+//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. At boxes and meshes the
+//! closest points to edges are candidates as well ([`crate::kernel::contact::edge`]). Elements from
 //! which the surface is farther than they reach have none: the distance changes by no more than a
 //! point moves.
 
 use super::strand::{ChainNode, Strand};
+use super::surface::SceneSurface;
 use crate::kernel::MAX_NODES;
 use crate::kernel::contact::along::{slopes, weighted_sum};
 use crate::kernel::contact::{
@@ -56,8 +57,9 @@ pub(super) struct Candidate {
     pub s: f64,
     /// At a node, or at the closest point
     pub place: Place,
-    /// The number of the edge of a box that it may touch; otherwise it may touch the whole surface
-    pub edge: Option<u8>,
+    /// The number of the edge of a box or a mesh that it may touch; otherwise it may touch the whole
+    /// surface
+    pub edge: Option<u32>,
 }
 
 impl Candidate {
@@ -83,6 +85,8 @@ struct SeenChain<'a> {
     places: Vec<Vec3>,
     /// A ball without contact: its centre and its radius
     free: (Vec3, f64),
+    /// Points of the chain with a force at the last look
+    points: &'a [PointMemory],
 }
 
 impl Chain {
@@ -98,7 +102,7 @@ impl Chain {
         let places = self.seen(carrier, at);
         let gap = |place: Vec3| surface.value(place, self.radius).map_or(f64::INFINITY, |value| value - self.radius);
         let nodes = places.iter().map(|place| gap(*place)).fold(f64::INFINITY, f64::min);
-        let seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0) };
+        let seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points: &[] };
         let elements = 0..if self.order == 0 { 0 } else { self.elements() };
         elements.flat_map(|k| seen.closest(k)).map(gap).fold(nodes, f64::min)
     }
@@ -134,22 +138,20 @@ impl Chain {
         memory: Option<&ChainMemory>,
         at: &State,
     ) -> Vec<Candidate> {
-        if memory.is_none_or(|memory| memory.points.is_empty()) && self.is_far(surface, carrier, at) {
-            return Vec::new();
-        }
         let places = self.seen(carrier, at);
-        let mut seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0) };
-        seen.candidates(memory)
+        let points = memory.map_or(&[][..], |memory| &memory.points);
+        SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points }.candidates()
     }
 
-    /// True if the surface is farther from the middle node than the chain reaches.
-    fn is_far(&self, surface: &Surface, carrier: &Carrier, at: &State) -> bool {
+    /// True if the surface is farther from the middle node than the chain reaches: no point of it has
+    /// a force. Most scenes ask this most of the time.
+    pub(super) fn is_far(&self, surface: &SceneSurface, at: &State) -> bool {
         let place = |node: &ChainNode| node.place + at.q[node.node.u as usize];
         let middle = place(&self.nodes[self.nodes.len() / 2]);
-        let Ok(distance) = surface.distance(carrier.on_surface(middle)) else { return false };
-        let gap = distance.value - self.radius * (1.0 + MARGIN);
-        let square = self.nodes.iter().map(|node| (place(node) - middle).squared()).fold(0.0, f64::max);
-        gap > 0.0 && REACH[self.order + 1] * square.sqrt() < gap
+        let Some(distance) = surface.distance(middle, at) else { return false };
+        let gap = distance - self.radius * (1.0 + MARGIN);
+        let reach = gap / REACH[self.order + 1];
+        gap > 0.0 && self.nodes.iter().all(|node| (place(node) - middle).squared() < reach * reach)
     }
 
     /// The number of the last point in memory of each candidate that touches the same thing: the
@@ -188,10 +190,10 @@ impl Chain {
 }
 
 impl SeenChain<'_> {
-    fn candidates(&mut self, memory: Option<&ChainMemory>) -> Vec<Candidate> {
+    fn candidates(&mut self) -> Vec<Candidate> {
         let count = self.chain.elements();
         let mut is_near = vec![false; count];
-        for k in self.remembered(memory) {
+        for k in self.remembered() {
             is_near[k] = true;
         }
         let mut candidates = Vec::new();
@@ -208,16 +210,15 @@ impl SeenChain<'_> {
     }
 
     /// The elements beside points that had a force.
-    fn remembered(&self, memory: Option<&ChainMemory>) -> Vec<usize> {
+    fn remembered(&self) -> Vec<usize> {
         let count = self.chain.elements() as isize;
-        let points = memory.map_or(&[][..], |memory| &memory.points);
         let is_closed = self.chain.is_closed();
         let element = |k: isize| if is_closed { k.rem_euclid(count) } else { k.clamp(0, count - 1) };
         let beside = |place: f64| {
             let [from, to] = [-LARGEST_SHIFT, LARGEST_SHIFT].map(|shift| (place + shift).floor() as isize);
             (from..=to).map(|k| element(k) as usize)
         };
-        points.iter().flat_map(|point| beside(point.place)).collect()
+        self.points.iter().flat_map(|point| beside(point.place)).collect()
     }
 
     fn places_of(&self, k: usize) -> &[Vec3] {
@@ -274,6 +275,10 @@ impl SeenChain<'_> {
     /// force of the element. The edge of a body that has come inside the section pushes it out, too,
     /// from the place where it is.
     fn add_minima(&self, k: usize, candidates: &mut Vec<Candidate>) -> bool {
+        // The node of a body touches edges and corners by its distance from the whole surface.
+        if self.chain.order == 0 {
+            return false;
+        }
         let mut is_sharp = false;
         for &Minimum { s, kind } in self.minima(k, &|y| self.surface.distance(y).ok()).found() {
             let place = match kind {
@@ -282,7 +287,7 @@ impl SeenChain<'_> {
                 MinimumKind::Kink | MinimumKind::Conforming => continue,
             };
             // Those at edges and corners are found by the distance from the edge.
-            if place == Place::Closest && !self.surface.edges().is_empty() {
+            if place == Place::Closest && self.surface.has_edges() {
                 continue;
             }
             is_sharp |= place == Place::Closest;
@@ -292,11 +297,31 @@ impl SeenChain<'_> {
         is_sharp
     }
 
-    /// The points of element `k` that are closest to an edge of a box, with its first node, and its
-    /// last one at the end of the chain. Nodes keep their own contact, since they may touch a face.
+    /// Numbers of the edges that element `k` may touch: those that are near, and those that it touched
+    /// before.
+    fn edges_of(&self, k: usize) -> Vec<u32> {
+        if !self.surface.has_edges() {
+            return Vec::new();
+        }
+        let places = self.places_of(k);
+        let [first, last] = [places[0], places[places.len() - 1]];
+        let part = |i: usize| i as f64 / (places.len() - 1).max(1) as f64;
+        let off_chord = |i: usize| (places[i] - first - (last - first) * part(i)).norm();
+        let sag = REACH[places.len()] * (0..places.len()).map(off_chord).fold(0.0, f64::max);
+        let mut edges = self.surface.edges_near([first, last], sag + self.chain.radius * (1.0 + MARGIN));
+        let place = k as f64;
+        let is_near = |point: &&PointMemory| (point.place - place - 0.5).abs() <= 0.5 + LARGEST_SHIFT;
+        edges.extend(self.points.iter().filter(is_near).filter_map(|point| point.edge));
+        edges.sort_unstable();
+        edges.dedup();
+        edges
+    }
+
+    /// The points of element `k` that are closest to an edge, with its first node, and its last one at
+    /// the end of the chain. Nodes keep their own contact, since they may touch a face.
     fn closest_to_edges(&self, k: usize) -> Vec<Candidate> {
         let mut found = Vec::new();
-        for number in self.surface.edges() {
+        for number in self.edges_of(k) {
             let Some(edge) = self.surface.edge(number) else { continue };
             let is_beside = |s: f64| edge.is_beside(self.place(k, s));
             let at = |s: f64, place: Place| Candidate { element: k, s, place, edge: Some(number) };

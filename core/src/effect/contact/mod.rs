@@ -8,12 +8,14 @@ mod chain;
 mod laws;
 mod pairs;
 mod resultant;
+mod shown;
 mod strand;
 mod surface;
 
 pub use chain::Chain;
 pub use laws::ContactLaws;
 pub use pairs::{BeamPairs, Meeting};
+pub use shown::NodeContact;
 pub use strand::{ChainNode, ContactStiffness, Strand};
 pub use surface::{SceneSurface, SurfaceCarrier};
 
@@ -83,12 +85,18 @@ impl SurfaceContacts {
         self.chains.iter().map(with_parts).filter(|(_, laws, _)| at.amplitude[laws.amplitude] != 0.0)
     }
 
-    /// Visits the chains whose contact acts in a state.
+    /// True if a chain may touch its surface in a state, or touched it before, and its contact acts.
+    fn is_near(&self, number: usize, at: &State) -> bool {
+        let chain = &self.chains[number];
+        let touched = at.contacts.chains.get(number).is_some_and(|memory| !memory.points.is_empty());
+        at.amplitude[self.laws[chain.contact].amplitude] != 0.0
+            && (touched || !chain.is_far(&self.surfaces[chain.surface], at))
+    }
+
+    /// Visits the chains that may touch their surfaces in a state, or touched them before.
     fn each_chain<'a>(&'a self, at: &'a State, weights: Weights, visit: &mut dyn FnMut(usize, &ChainNow<'a>)) {
-        for (number, chain) in self.chains.iter().enumerate() {
-            if at.amplitude[self.laws[chain.contact].amplitude] != 0.0 {
-                visit(number, &self.chain_now(number, at, weights));
-            }
+        for number in (0..self.chains.len()).filter(|&number| self.is_near(number, at)) {
+            visit(number, &self.chain_now(number, at, weights));
         }
     }
 
@@ -107,15 +115,16 @@ impl SurfaceContacts {
         PairRole { pairs: &self.pairs, laws: &self.laws }
     }
 
-    /// The number of the first instance of each chain.
-    fn first_instances(&self) -> Vec<usize> {
-        let mut next = 0;
-        let first = |chain: &Chain| {
-            let own = next;
-            next += chain.elements();
-            own
-        };
-        self.chains.iter().map(first).collect()
+    /// The number of the first instance of a chain.
+    fn first_instance(&self, number: usize) -> usize {
+        self.chains[..number].iter().map(|chain| chain.elements()).sum()
+    }
+
+    /// True if no chain touches, or touched, and none has friction, which follows nodes that do not
+    /// touch: there is nothing to remember.
+    fn is_clear(&self, at: &State) -> bool {
+        let is_clear = |number: usize| !self.laws[self.chains[number].contact].rubs() && !self.is_near(number, at);
+        self.pairs.is_empty() && (0..self.chains.len()).all(is_clear)
     }
 
     /// Writes a new memory of all chains.
@@ -132,7 +141,7 @@ impl SurfaceContacts {
             } else if let Some(old) = old {
                 new.nodes.clone_from(&old.nodes);
             }
-            if at.amplitude[laws.amplitude] == 0.0 {
+            if !self.is_near(number, at) {
                 continue;
             }
             let now = self.chain_now(number, at, Weights::NONE);
@@ -453,13 +462,14 @@ impl Effect for SurfaceContacts {
     }
 
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
-        let elements = self.chains.iter().map(|chain| chain.elements()).sum();
-        self.pairs().add(at, &memory.pairs, weights, elements, out);
-        let first = self.first_instances();
+        if !self.pairs.is_empty() {
+            self.pairs().add(at, &memory.pairs, weights, self.first_instance(self.chains.len()), out);
+        }
         self.each_chain(at, weights, &mut |number, chain| {
+            let first = self.first_instance(number);
             chain.each_point(weights, &mut |point, system| {
                 if point.state.status() != Status::Open {
-                    out.add(first[number] + point.candidate.element, system);
+                    out.add(first + point.candidate.element, system);
                 }
             });
         });
@@ -570,6 +580,10 @@ impl Contacts for SurfaceContacts {
     }
 
     fn accept(&self, before: &State, at: &mut State) {
+        if self.is_clear(at) && at.contacts.damping_power == 0.0 {
+            at.contacts.factor = at.contacts.first_factor;
+            return;
+        }
         if at.contacts.regime == ContactRegime::Penalty {
             self.judge_penalty(at);
         }

@@ -68,6 +68,25 @@ impl SceneSurface {
         }
     }
 
+    /// The distance of a place (global components); `None` where the surface has no normal.
+    pub(super) fn distance(&self, place: Vec3, at: &State) -> Option<f64> {
+        let place = match self.carrier {
+            SurfaceCarrier::Ground => place,
+            SurfaceCarrier::Shift { direction, amplitude } => place - direction * at.amplitude[amplitude],
+            SurfaceCarrier::Node { .. } | SurfaceCarrier::Turn { .. } => {
+                self.carrier(at, Weights::NONE).on_surface(place)
+            }
+        };
+        self.surface.distance(place).ok().map(|distance| distance.value)
+    }
+
+    /// Its rotation and its shift in a state: a point y of the surface is at R y + d.
+    pub fn pose(&self, at: &State) -> (Mat3, Vec3) {
+        let carrier = self.carrier(at, Weights::NONE);
+        let rotation = carrier.rotation.r;
+        (rotation, carrier.place - rotation * carrier.origin)
+    }
+
     /// The depth from which a point that penetrates still finds its way out; infinite for planes, and
     /// where beams are inside.
     pub(super) fn depth(&self) -> f64 {
@@ -109,7 +128,7 @@ impl SceneSurface {
                 show(MirrorData::Place(*centre));
                 show(MirrorData::Tensor(*axes * Mat3::diagonal(*half) * axes.transpose()));
             }
-            Shape::Tube(_) => show(MirrorData::Spatial),
+            Shape::Tube(_) | Shape::Mesh(_) => show(MirrorData::Spatial),
         }
         match self.carrier {
             SurfaceCarrier::Ground => {}

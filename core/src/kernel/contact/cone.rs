@@ -64,6 +64,11 @@ impl Cone {
         [self.from, self.from + self.axis * self.length]
     }
 
+    /// The radii at both ends.
+    pub(super) fn radii(&self) -> [f64; 2] {
+        self.radii
+    }
+
     /// The smaller one of the radii.
     pub fn least_radius(&self) -> f64 {
         self.radii[0].min(self.radii[1])

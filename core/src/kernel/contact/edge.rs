@@ -1,4 +1,4 @@
-//! The edges of a box that beams touch from outside.
+//! The edges that beams touch: of boxes from outside, of triangle meshes where they protrude.
 //!
 //! A beam that lies across a box touches its edges, also where the distance from the box has no
 //! minimum along the beam, as over a face that the beam is parallel to. Each edge is touched at the
@@ -16,12 +16,12 @@
 use super::distance::{Distance, Feature, Undefined, sphere};
 use super::surface::{Shape, Side, Surface, cylinder};
 use crate::scalar::Real;
-use crate::tensor::Vec3;
+use crate::tensor::{Mat3, Vec3};
 
 /// Number of edges of a box.
-const EDGES: u8 = 12;
+const EDGES: u32 = 12;
 
-/// An edge of a box, in the axes of the surface's carrier.
+/// An edge of a box or a mesh, in the axes of the surface's carrier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
     middle: Vec3,
@@ -31,28 +31,72 @@ pub struct Edge {
     half: f64,
     /// The normals of its two faces
     normals: [Vec3; 2],
-    /// Half lengths of the box along them
+    /// Half lengths of the box along them; infinite for meshes, of which other edges have places of
+    /// their own
     depths: [f64; 2],
 }
 
 impl Surface {
-    /// Numbers of the edges that beams outside can touch.
-    pub fn edges(&self) -> std::ops::Range<u8> {
-        let is_touched = matches!(self.shape, Shape::Box { .. }) && self.side == Side::Outside;
-        0..if is_touched { EDGES } else { 0 }
+    /// True if closest points to edges are contact points of their own.
+    pub fn has_edges(&self) -> bool {
+        match &self.shape {
+            Shape::Box { .. } => self.side == Side::Outside,
+            Shape::Mesh(_) => true,
+            Shape::Plane { .. }
+            | Shape::Sphere { .. }
+            | Shape::Cylinder { .. }
+            | Shape::Cone(_)
+            | Shape::Torus { .. }
+            | Shape::Tube(_) => false,
+        }
     }
 
-    /// The edge with a number; `None` for other surfaces than boxes.
-    pub fn edge(&self, number: u8) -> Option<Edge> {
-        let Shape::Box { centre, axes, half } = &self.shape else { return None };
-        let along = usize::from(number) / 4;
-        let others = [(along + 1) % 3, (along + 2) % 3];
-        let signs = [1, 2].map(|bit| if number & bit == 0 { 1.0 } else { -1.0 });
-        let normals = [0, 1].map(|k| axes.column(others[k]) * signs[k]);
-        let depths = others.map(|axis| half[axis]);
-        let middle = *centre + normals[0] * depths[0] + normals[1] * depths[1];
-        Some(Edge { middle, along: axes.column(along), half: half[along], normals, depths })
+    /// Numbers of the edges that beams can touch, in ascending order: all that are within `reach` of
+    /// the line between two points, and maybe others.
+    pub fn edges_near(&self, line: [Vec3; 2], reach: f64) -> Vec<u32> {
+        match &self.shape {
+            Shape::Mesh(mesh) => mesh.edges_near(line, reach, self.side),
+            Shape::Box { .. } if self.side == Side::Outside => (0..EDGES).collect(),
+            Shape::Box { .. }
+            | Shape::Plane { .. }
+            | Shape::Sphere { .. }
+            | Shape::Cylinder { .. }
+            | Shape::Cone(_)
+            | Shape::Torus { .. }
+            | Shape::Tube(_) => Vec::new(),
+        }
     }
+
+    /// The edge with a number; `None` for surfaces without edges.
+    pub fn edge(&self, number: u32) -> Option<Edge> {
+        match &self.shape {
+            Shape::Box { centre, axes, half } => Some(edge_of_box(*centre, axes, *half, number)),
+            Shape::Mesh(mesh) => {
+                let (middle, along, half, outward) = mesh.edge(number)?;
+                let normals = match self.side {
+                    Side::Outside => outward,
+                    Side::Inside => outward.map(|normal| -normal),
+                };
+                Some(Edge { middle, along, half, normals, depths: [f64::INFINITY; 2] })
+            }
+            Shape::Plane { .. }
+            | Shape::Sphere { .. }
+            | Shape::Cylinder { .. }
+            | Shape::Cone(_)
+            | Shape::Torus { .. }
+            | Shape::Tube(_) => None,
+        }
+    }
+}
+
+fn edge_of_box(centre: Vec3, axes: &Mat3, half: [f64; 3], number: u32) -> Edge {
+    let along = (number / 4) as usize;
+    let others = [(along + 1) % 3, (along + 2) % 3];
+    let signs = [1, 2].map(|bit| if number & bit == 0 { 1.0 } else { -1.0 });
+    let normals = [0, 1].map(|k| axes.column(others[k]) * signs[k]);
+    let depths = others.map(|axis| half[axis]);
+    let middle = centre + normals[0] * depths[0] + normals[1] * depths[1];
+    Edge { middle, along: axes.column(along), half: half[along], normals, depths }
 }
 
 impl Edge {
@@ -93,7 +137,7 @@ mod tests {
     fn normals_and_curvatures_are_derivatives() {
         let mut random = Random(5);
         let surface = cuboid(&mut random);
-        for number in surface.edges() {
+        for number in 0..EDGES {
             let edge = surface.edge(number).unwrap();
             for _ in 0..50 {
                 let y = random.vector(2.0);
@@ -110,7 +154,7 @@ mod tests {
     fn edges_and_corners_have_the_distance_of_the_box() {
         let mut random = Random(8);
         let surface = cuboid(&mut random);
-        let edges: Vec<Edge> = surface.edges().filter_map(|number| surface.edge(number)).collect();
+        let edges: Vec<Edge> = (0..EDGES).filter_map(|number| surface.edge(number)).collect();
         let mut strips = 0;
         for _ in 0..2000 {
             let y = random.vector(1.6);
@@ -135,8 +179,8 @@ mod tests {
     fn other_surfaces_have_no_edges() {
         let shape = Shape::Sphere { centre: Vec3::ZERO, radius: 1.0 };
         let ball = Surface { shape, side: Side::Outside };
-        assert!(ball.edges().is_empty() && ball.edge(0).is_none());
+        assert!(!ball.has_edges() && ball.edge(0).is_none());
         let inside = Surface { side: Side::Inside, ..cuboid(&mut Random(1)) };
-        assert!(inside.edges().is_empty());
+        assert!(!inside.has_edges() && inside.edges_near([Vec3::ZERO; 2], 9.0).is_empty());
     }
 }

@@ -3,7 +3,7 @@
 //! Sections are round with a radius r for contact, whatever their stiffness. A contact adds f =
 //! dW/dq, in the sign of internal forces (g = f_int + f_acc - f_ext), and K = df/dq.
 //!
-//! Order of reading: [`surface`], [`edge`], [`tube`] (distance, normal and curvature of rigid surfaces),
+//! Order of reading: [`surface`], [`edge`], [`tube`], [`mesh`] (distance, normal and curvature of rigid surfaces),
 //! [`law`] (normal force of a gap), [`friction`] (traction by return mapping), [`point`] (forces
 //! and tangent of one contact point), [`along`] (closest points that move along an element),
 //! [`beam_pair`] (the same of two elements), [`pair_search`] (their closest points, and motions that
@@ -19,7 +19,13 @@ pub mod edge;
 pub mod friction;
 pub mod grid;
 pub mod law;
+pub mod mesh;
+mod mesh_parts;
+#[cfg(test)]
+mod mesh_tests;
+mod mesh_tree;
 pub mod minimum;
+mod outline;
 pub mod pair_search;
 pub mod point;
 pub mod surface;
@@ -40,6 +46,8 @@ pub use distance::{Distance, Feature, Undefined};
 pub use edge::Edge;
 pub use friction::{CarriedTraction, FrictionLaw, Status, Traction};
 pub use law::{NormalForce, NormalLaw};
+pub use mesh::TriangleMesh;
+pub use mesh_parts::MeshError;
 pub use point::{Carrier, ContactLaw, Place, PointState, add_point};
 pub use surface::{Shape, Side, Surface};
 pub use tube::{Tube, TubeEnds, TubeError};

@@ -17,6 +17,7 @@
 //! box        q=|y|-h: any q>0: v=max(q,0) sign y, l=|v|, n=v/l, H=(diag(q>0)-nn)/l;
 //!            otherwise the face of the largest q, H=0
 //! tube       see [`super::tube`]
+//! mesh       see [`super::mesh`]
 //! ```
 //!
 //! H jumps where the closest point passes from one part of a surface to another (the ends of
@@ -27,9 +28,11 @@
 
 use super::cone::Cone;
 use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, Undefined, sphere};
+use super::mesh::TriangleMesh;
 use super::tube::Tube;
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
+use std::sync::Arc;
 
 /// The side of a surface on which beams are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,6 +94,8 @@ pub enum Shape {
     },
     /// A tube along a curve
     Tube(Tube),
+    /// A closed triangle mesh
+    Mesh(Arc<TriangleMesh>),
 }
 
 /// A rigid surface.
@@ -136,6 +141,7 @@ impl Shape {
             Self::Torus { centre, axis, ring, radius } => torus(y - Vec3::constant(*centre), *axis, *ring, *radius),
             Self::Box { centre, axes, half } => Ok(cuboid(y - Vec3::constant(*centre), *axes, *half)),
             Self::Tube(tube) => tube.distance(y),
+            Self::Mesh(mesh) => mesh.distance(y),
         }
     }
 
@@ -148,11 +154,13 @@ impl Shape {
             Self::Cone(cone) => cone.least_radius(),
             Self::Box { half, .. } => half[0].min(half[1]).min(half[2]),
             Self::Tube(tube) => tube.least_radius(),
+            Self::Mesh(mesh) => mesh.depth(),
         }
     }
 }
 
-fn plane<T: Real>(y: Vec3<T>, point: Vec3, normal: Vec3) -> Distance<T> {
+/// The distance of the point `y` from a plane.
+pub(super) fn plane<T: Real>(y: Vec3<T>, point: Vec3, normal: Vec3) -> Distance<T> {
     let normal = Vec3::constant(normal);
     let value = normal.dot(y - Vec3::constant(point));
     Distance { value, normal, curvature: Mat3::zero(), feature: Feature::Face }

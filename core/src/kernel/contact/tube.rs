@@ -173,6 +173,25 @@ impl Tube {
         Ok(Self { line: CentreLine::Smooth(pieces), ends, least_radius })
     }
 
+    /// Places of the centre line with their radii, close enough to draw it.
+    pub(super) fn sections(&self) -> Vec<(Vec3, f64)> {
+        match &self.line {
+            CentreLine::Straight(cones) => {
+                let ends = |cone: &Cone| cone.ends().into_iter().zip(cone.radii()).collect::<Vec<_>>();
+                let first = cones.first().map(|cone| ends(cone)[0]);
+                first.into_iter().chain(cones.iter().map(|cone| ends(cone)[1])).collect()
+            }
+            CentreLine::Smooth(pieces) => {
+                let at = |k: usize| {
+                    let piece = (k / INTERVALS).min(pieces.len() - 1);
+                    let section = pieces[piece].at(k as f64 / INTERVALS as f64 - piece as f64);
+                    (section.place[0], section.radius[0])
+                };
+                (0..=INTERVALS * pieces.len()).map(at).collect()
+            }
+        }
+    }
+
     /// The least radius.
     pub fn least_radius(&self) -> f64 {
         self.least_radius

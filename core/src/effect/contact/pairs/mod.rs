@@ -155,7 +155,7 @@ impl BeamPairs {
     }
 
     /// Both strands of a meeting.
-    fn both(&self, meeting: usize) -> [&Strand; 2] {
+    pub(super) fn both(&self, meeting: usize) -> [&Strand; 2] {
         self.meetings[meeting].strands.map(|strand| &self.strands[strand])
     }
 
