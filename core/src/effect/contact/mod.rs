@@ -124,7 +124,7 @@ impl SurfaceContacts {
     /// touch: there is nothing to remember.
     fn is_clear(&self, at: &State) -> bool {
         let is_clear = |number: usize| !self.laws[self.chains[number].contact].rubs() && !self.is_near(number, at);
-        self.pairs.is_empty() && (0..self.chains.len()).all(is_clear)
+        self.pairs.is_empty() && !at.contacts.touches() && (0..self.chains.len()).all(is_clear)
     }
 
     /// Writes a new memory of all chains.
