@@ -97,7 +97,11 @@ impl<'a> PairsNow<'a> {
         let places = if list.is_empty() { Vec::new() } else { pairs.places(at) };
         let known = &at.contacts.pairs;
         let is_known = *list == **known.list && known.blend.len() == list.len();
-        let blend = if is_known { Cow::Borrowed(&known.blend[..]) } else { Cow::Owned(pairs.blend(list, &places)) };
+        let blend = if is_known {
+            Cow::Borrowed(&known.blend[..])
+        } else {
+            Cow::Owned(pairs.blend(list, &places, at.contacts.regime))
+        };
         Self { pairs, laws, at, list, places, blend }
     }
 
