@@ -177,8 +177,16 @@ fn no_friction_is_friction_left_out() {
     assert_eq!(with.counters.work.iterations, without.counters.work.iterations);
 }
 
+/// Contact alone in a state of two beams.
+struct Rubbing {
+    assembly: Assembly,
+    state: State,
+    /// Force and moment about the origin on each node
+    loads: Vec<(Vec3, Vec3)>,
+}
+
 /// A state of two beams in contact, with a memory of friction, after a small random motion.
-fn rubbing(random: &mut Random) -> Option<(Assembly, State, Vec<(Vec3, Vec3)>)> {
+fn rubbing(random: &mut Random) -> Option<Rubbing> {
     let dragged = Dragged::random(random);
     let text = dragged.deck().replace("name = \"c\"", "name = \"c\"\nstiffness = 3\nstick = 2");
     let (scene, _) = scene::from_text(&text).unwrap();
@@ -218,7 +226,7 @@ fn rubbing(random: &mut Random) -> Option<(Assembly, State, Vec<(Vec3, Vec3)>)> 
         (force, (node.place + state.q[u]).cross(force) + moment)
     });
     let loads = loads.collect();
-    Some((assembly, state, loads))
+    Some(Rubbing { assembly, state, loads })
 }
 
 #[test]
@@ -227,7 +235,7 @@ fn friction_of_pairs_balances_and_has_its_tangent() {
     let mut touch = 0;
     let mut worst = [0.0f64; 2];
     for case in 0..60 {
-        let Some((mut assembly, state, loads)) = rubbing(&mut random) else { continue };
+        let Some(Rubbing { mut assembly, state, loads }) = rubbing(&mut random) else { continue };
         let sum = loads.iter().fold(Vec3::ZERO, |sum, (force, _)| sum + *force);
         let moment = loads.iter().fold(Vec3::ZERO, |sum, (_, moment)| sum + *moment);
         let size = loads.iter().map(|(force, _)| force.norm()).fold(0.0, f64::max);
