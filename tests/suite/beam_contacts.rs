@@ -335,3 +335,110 @@ fn beams_that_begin_inside_each_other_are_refused() {
     assert_eq!(failure.kind(), FailureKind::ContactStart);
     assert!(failure.to_string().contains("inside \"second\""), "{failure}");
 }
+
+/// Two beams in line whose ends, nodes of their own at one place, a joint connects.
+#[test]
+fn beams_that_a_joint_connects_do_not_touch_there() {
+    let text = |joint: &str| {
+        format!(
+            r#"
+[section.s]
+EA = 100
+GA = 100
+GJ = 1
+EI = 1
+[point]
+o = [0, 0, 0]
+m = [1, 0, 0]
+n = [1, 0, 0]
+e = [1.8, 0.6, 0]
+[[beam]]
+name = "a"
+section = "s"
+through = ["o", "m"]
+elements = 10
+[[beam]]
+name = "b"
+section = "s"
+through = ["n", "e"]
+elements = 10
+[[support]]
+at = "o"
+fix = "all"
+{joint}
+[[load]]
+at = "e"
+force = [0, 0, 0.01]
+[[contact]]
+name = "c"
+beams = ["a"]
+with = ["b"]
+radius = 0.04
+[[stage]]
+kind = "static"
+steps = 2
+[output]
+nodes = ["e"]
+columns = ["u", "contact"]
+"#
+        )
+    };
+    let joined = simulate(&text("[[joint]]\nkind = \"rigid\"\nnodes = [\"m\", \"n\"]"));
+    assert_eq!(joined.column("c.points"), [0.0; 3]);
+    // Without the joint the beams begin inside each other.
+    let held = "[[support]]\nat = \"n\"\nfix = \"all\"";
+    assert_eq!(attempt(&text(held)).result.unwrap_err().kind(), FailureKind::ContactStart);
+}
+
+/// A ring whose ends meet in the middle of a bar below: one contact point, with the force of all.
+#[test]
+fn the_node_that_closes_a_ring_touches_once() {
+    let text = r#"
+[section.s]
+EA = 100
+GA = 100
+GJ = 1
+EI = 1
+rhoA = 1
+[point]
+low = [0, 0, 0]
+[[beam]]
+name = "ring"
+section = "s"
+through = ["low", [1, 0, 1], [0, 0, 2], [-1, 0, 1], "low"]
+elements = [2, 2, 2, 2]
+[[beam]]
+name = "bar"
+section = "s"
+through = [[0, -0.5, -0.1], [0, 0.5, -0.1]]
+elements = 3
+[[support]]
+at = "bar@start"
+fix = "all"
+[[support]]
+at = "bar@end"
+fix = "all"
+[[load]]
+at = "low"
+force = [0, 0, -0.5]
+[[contact]]
+name = "c"
+beams = ["ring"]
+with = ["bar"]
+radius = 0.05
+stiffness = 1e3
+[[stage]]
+kind = "dynamic"
+end = 0.02
+step = 1e-3
+[output]
+nodes = ["low"]
+columns = ["u", "contact"]
+"#;
+    let simulation = simulate(text);
+    let points = simulation.column("c.points");
+    assert!(points.iter().all(|&points| points <= 1.0) && points.contains(&1.0), "{points:?}");
+    // One penalty: p = K d.
+    let [normal, depth] = ["c.normal", "c.depth"].map(|name| simulation.end(name));
+    assert!((normal - 1e3 * depth).abs() < 1e-9 * normal, "{normal} {depth}");
+}

@@ -177,8 +177,13 @@ fn no_friction_is_friction_left_out() {
     assert_eq!(with.counters.work.iterations, without.counters.work.iterations);
 }
 
-/// An assembly, a state of it, and force and moment about the origin of each node.
-type Rubbing = (Assembly, State, Vec<(Vec3, Vec3)>);
+/// Contact alone in a state of two beams.
+struct Rubbing {
+    assembly: Assembly,
+    state: State,
+    /// Force and moment about the origin on each node
+    loads: Vec<(Vec3, Vec3)>,
+}
 
 /// A state of two beams in contact, with a memory of friction, after a small random motion.
 fn rubbing(random: &mut Random) -> Option<Rubbing> {
@@ -221,7 +226,7 @@ fn rubbing(random: &mut Random) -> Option<Rubbing> {
         (force, (node.place + state.q[u]).cross(force) + moment)
     });
     let loads = loads.collect();
-    Some((assembly, state, loads))
+    Some(Rubbing { assembly, state, loads })
 }
 
 #[test]
@@ -230,7 +235,7 @@ fn friction_of_pairs_balances_and_has_its_tangent() {
     let mut touch = 0;
     let mut worst = [0.0f64; 2];
     for case in 0..60 {
-        let Some((mut assembly, state, loads)) = rubbing(&mut random) else { continue };
+        let Some(Rubbing { mut assembly, state, loads }) = rubbing(&mut random) else { continue };
         let sum = loads.iter().fold(Vec3::ZERO, |sum, (force, _)| sum + *force);
         let moment = loads.iter().fold(Vec3::ZERO, |sum, (_, moment)| sum + *moment);
         let size = loads.iter().map(|(force, _)| force.norm()).fold(0.0, f64::max);

@@ -37,6 +37,8 @@ pub struct Attempts {
     pub soft: bool,
     /// Contacts touch in the last balance.
     pub touches: bool,
+    /// Beams touch beams there.
+    pub beams_touch: bool,
 }
 
 /// A failure of a run, with its numbers.

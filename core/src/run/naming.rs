@@ -30,6 +30,7 @@ impl StageRun<'_> {
                     cutbacks: self.counters.cutbacks - self.cutbacks_before,
                     soft: self.soft,
                     touches: self.good.contacts.touches(),
+                    beams_touch: !self.good.contacts.pairs.points.is_empty(),
                 },
             },
             NewtonFailure::StepTooSmall { slot, error, share } => {

@@ -202,7 +202,15 @@ impl Composer<'_> {
         let second = first + own.len();
         let end = second + with.len();
         let name = |strand: &Strand| strand.beam.map_or(String::new(), |beam| self.mesh.beams[beam].name.clone());
-        pairs.beams.extend(own.into_iter().chain(with).map(|strand| (name(&strand), strand)));
+        // A stiffness of the deck is that of a point: of two beams in series.
+        let of_each = if contact.stiffness.is_some() { 2.0 } else { 1.0 };
+        for mut strand in own.into_iter().chain(with) {
+            for stiffness in &mut strand.stiffness {
+                stiffness.augmented *= of_each;
+                stiffness.penalty *= of_each;
+            }
+            pairs.beams.push((name(&strand), strand));
+        }
         for a in first..second {
             pairs.meetings.extend((second..end).map(|b| Meeting { strands: [a, b] }));
             if contact.touches_itself {

@@ -217,6 +217,21 @@ impl SurfaceContacts {
         self.pairs().judge_penalty(at);
     }
 
+    /// A node at a point with friction whose normal has turned over since the last converged state.
+    fn turned_over(&self, at: &State) -> Option<Slot> {
+        let mut turned = None;
+        if self.laws.iter().any(ContactLaws::rubs) {
+            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+                chain.each_point(Weights::NONE, &mut |point, _| {
+                    if point.state.traction.turned_over {
+                        turned = Some(chain.slot_of(point.candidate));
+                    }
+                });
+            });
+        }
+        turned.or_else(|| self.pairs().turned_over(at))
+    }
+
     fn damping_power(&self, at: &State) -> f64 {
         let mut power = 0.0;
         if at.contacts.regime == ContactRegime::Penalty && self.laws.iter().any(|laws| laws.damping != 0.0) {
@@ -577,6 +592,7 @@ impl Contacts for SurfaceContacts {
             point.offset = point.force / stiffness.penalty + point.gap;
             point.steps = 0;
         });
+        self.pairs().share_anew(at);
     }
 
     fn accept(&self, before: &State, at: &mut State) {
@@ -690,15 +706,7 @@ impl Contacts for SurfaceContacts {
                 }
             }
         }
-        let mut turned = None;
-        self.each_chain(to, Weights::NONE, &mut |_, chain| {
-            chain.each_point(Weights::NONE, &mut |point, _| {
-                if point.state.traction.turned_over {
-                    turned = Some(chain.slot_of(point.candidate));
-                }
-            });
-        });
-        turned.or_else(|| self.pairs().passed(from, to))
+        self.turned_over(to).or_else(|| self.pairs().passed(from, to))
     }
 
     fn energy(&self, at: &State) -> f64 {

@@ -8,8 +8,9 @@ use super::candidate::PairCandidate;
 use super::point::{PairPoint, PairsNow};
 use super::{BeamPairs, PairRole};
 use crate::effect::contact::laws::ContactLaws;
+use crate::kernel::Weights;
 use crate::kernel::contact::{CarriedTraction, FrictionLaw, NodeBefore};
-use crate::system::{ContactRegime, ListedPair, PairPointMemory, State};
+use crate::system::{ContactRegime, ListedPair, PairPointMemory, Slot, State};
 use crate::tensor::Mat3;
 
 impl BeamPairs {
@@ -129,6 +130,19 @@ impl PairRole<'_> {
             point.weight * point.point.traction.squared() / (2.0 * now.stick(&now.pair_of(point), laws))
         };
         at.contacts.pairs.points.iter().map(of_point).sum()
+    }
+
+    /// A node at a point with friction whose normal has turned over since the last converged state.
+    pub(in crate::effect::contact) fn turned_over(self, at: &State) -> Option<Slot> {
+        let mut turned = None;
+        if self.rubs() {
+            self.now(at).each_point(Weights::NONE, &mut |point, _| {
+                if point.state.traction.turned_over {
+                    turned = Some(self.slot_of(&point.pair));
+                }
+            });
+        }
+        turned
     }
 
     /// True if some contact of beams has friction.

@@ -11,7 +11,7 @@ use crate::effect::MissedPairs;
 use crate::effect::contact::chain::REACH;
 use crate::kernel::contact::grid::{Ball, overlapping};
 use crate::kernel::contact::pair_search::{Segments, safe_part};
-use crate::system::{ListedPair, PairsMemory, State};
+use crate::system::{ContactRegime, ListedPair, PairsMemory, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -54,7 +54,7 @@ impl BeamPairs {
         let margin = self.margin();
         let list = self.near(&places, margin);
         PairsMemory {
-            blend: Arc::new(self.blend(&list, &places)),
+            blend: Arc::new(self.blend(&list, &places, at.contacts.regime)),
             list: Arc::new(list),
             places: Arc::new(places),
             margin,
@@ -78,7 +78,7 @@ impl BeamPairs {
             memory.margin = margin;
             memory.places = Arc::new(places.clone());
         }
-        memory.blend = Arc::new(self.blend(&memory.list, &places));
+        memory.blend = Arc::new(self.blend(&memory.list, &places, at.contacts.regime));
     }
 
     /// Adds to the list of `from` the pairs that may have met on the way to another state without
@@ -103,7 +103,7 @@ impl BeamPairs {
         let mut list = (*memory.list).clone();
         list.extend(missed);
         list.sort_unstable();
-        memory.blend = Arc::new(self.blend(&list, &before));
+        memory.blend = Arc::new(self.blend(&list, &before, to.contacts.regime));
         memory.list = Arc::new(list);
         MissedPairs::Listed(slot)
     }
@@ -237,9 +237,10 @@ impl BeamPairs {
     }
 
     /// The part of the force of each pair that closest points carry, by the angle between the
-    /// chords of its elements and by how far that takes neighbouring nodes across the other beam: all
-    /// of it where they cross, none where they are side by side.
-    pub(super) fn blend(&self, list: &[ListedPair], places: &[Vec3]) -> Vec<f64> {
+    /// chords of its elements: all of it where they cross, none where they are side by side. In static
+    /// stages also by how far the angle takes neighbouring nodes across the other beam. Penalties
+    /// would jump there where a point goes from one pair of curved beams to the next.
+    pub(super) fn blend(&self, list: &[ListedPair], places: &[Vec3], regime: ContactRegime) -> Vec<f64> {
         let of_pair = |pair: &ListedPair| {
             let chord = |of: ElementOf| {
                 let nodes = self.of_element(of, places);
@@ -254,10 +255,13 @@ impl BeamPairs {
             let offset = spacing * sine / (strands[0].radius + strands[1].radius);
             let by_angle = smooth_part(angle, [SIDE_BY_SIDE, CROSSING]);
             // The closest points of curved elements side by side may part into two.
-            if strands.iter().any(|strand| strand.order > 1) {
-                return by_angle;
+            let is_straight = strands.iter().all(|strand| strand.order == 1);
+            match regime {
+                ContactRegime::Augmented if is_straight => {
+                    by_angle.max(smooth_part(offset, [SMALLEST_OFFSET, LARGEST_OFFSET]))
+                }
+                ContactRegime::Augmented | ContactRegime::Penalty => by_angle,
             }
-            by_angle.max(smooth_part(offset, [SMALLEST_OFFSET, LARGEST_OFFSET]))
         };
         list.iter().map(of_pair).collect()
     }

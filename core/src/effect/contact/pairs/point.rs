@@ -97,7 +97,11 @@ impl<'a> PairsNow<'a> {
         let places = if list.is_empty() { Vec::new() } else { pairs.places(at) };
         let known = &at.contacts.pairs;
         let is_known = *list == **known.list && known.blend.len() == list.len();
-        let blend = if is_known { Cow::Borrowed(&known.blend[..]) } else { Cow::Owned(pairs.blend(list, &places)) };
+        let blend = if is_known {
+            Cow::Borrowed(&known.blend[..])
+        } else {
+            Cow::Owned(pairs.blend(list, &places, at.contacts.regime))
+        };
         Self { pairs, laws, at, list, places, blend }
     }
 
@@ -243,35 +247,31 @@ impl<'a> PairsNow<'a> {
         (self.side::<NA>(a).place(s) - self.side::<NB>(b).place(e)).norm()
     }
 
-    /// Of closest points near each other on both beams, as at the inside of a kink, keeps the one with
-    /// the smallest gap: two penalties would jump to one where the points merge.
+    /// Of closest points near each other on both beams, and of those of a node, as at the inside of a
+    /// kink, keeps the one with the smallest gap: two penalties would jump to one where the points
+    /// merge.
     fn keep_nearest(&self, found: &mut Vec<Found>) {
-        let along = |found: &Found| {
-            let pair = &self.list[found.number];
-            [0, 1].map(|side| f64::from(pair.elements[side]) + found.candidate.at[side])
-        };
-        let distance = |found: &Found| {
-            let pair = &self.list[found.number];
-            let orders = self.pairs.both(pair.meeting as usize).map(|strand| strand.order);
-            of_orders!(orders, self.distance(pair, found.candidate.at))
-        };
         let Some(first) = found.first() else { return };
         let strands = self.pairs.both(self.list[first.number].meeting as usize);
-        let closest = |found: &&Found| found.candidate.kind == PairPointKind::Closest;
-        let all: Vec<([f64; 2], f64)> =
-            found.iter().filter(closest).map(|found| (along(found), distance(found))).collect();
+        let orders = strands.map(|strand| strand.order);
+        let reach = |Found { number, candidate }: &Found| {
+            let pair = &self.list[*number];
+            let along = [0, 1].map(|side| f64::from(pair.elements[side]) + candidate.at[side]);
+            (candidate.kind, along, of_orders!(orders, self.distance(pair, candidate.at)))
+        };
+        let all: Vec<(PairPointKind, [f64; 2], f64)> = found.iter().map(reach).collect();
         let is_beaten = |own: usize| {
-            let (place, gap) = all[own];
-            all.iter().enumerate().any(|(other, (at, less))| {
-                let is_near = (0..2).all(|side| strands[side].shift(place[side], at[side]) < SAME_PLACE);
+            let (kind, place, gap) = all[own];
+            all.iter().enumerate().any(|(other, (other_kind, at, less))| {
+                let shifts = [0, 1].map(|side| strands[side].shift(place[side], at[side]));
+                let is_near = *other_kind == kind && is_near(kind, shifts, SAME_PLACE);
                 is_near && (*less < gap || (*less == gap && other < own))
             })
         };
-        let mut number = 0;
-        found.retain(|found| {
-            let is_closest = found.candidate.kind == PairPointKind::Closest;
-            number += usize::from(is_closest);
-            !(is_closest && is_beaten(number - 1))
+        let mut own = 0;
+        found.retain(|_| {
+            own += 1;
+            !is_beaten(own - 1)
         });
     }
 
@@ -432,21 +432,26 @@ impl<'a> PairsNow<'a> {
         let goes_round = strands[0].is_closed();
         let is_before = |point: &PairPointMemory| !goes_round && point.point.place < along[0] - LARGEST_SHIFT;
         let first = memory.partition_point(is_before);
-        let is_near = |point: &&PairPointMemory| goes_round || point.point.place <= along[0] + LARGEST_SHIFT;
+        let may_be_near = |point: &&PairPointMemory| goes_round || point.point.place <= along[0] + LARGEST_SHIFT;
         let mut links = Vec::new();
-        for (j, point) in memory[first..].iter().take_while(is_near).enumerate() {
+        for (j, point) in memory[first..].iter().take_while(may_be_near).enumerate() {
             let places = [point.point.place, point.on_second];
             let shifts = [0, 1].map(|side| strands[side].shift(places[side], along[side]));
-            let is_same = match candidate.kind {
-                PairPointKind::Closest => true,
-                PairPointKind::NodeOfFirst => shifts[0] == 0.0,
-                PairPointKind::NodeOfSecond => shifts[1] == 0.0,
-            };
-            let is_near = shifts.iter().all(|&shift| shift <= LARGEST_SHIFT);
-            if point.kind == candidate.kind && is_same && is_near {
+            if point.kind == candidate.kind && is_near(candidate.kind, shifts, LARGEST_SHIFT) {
                 links.push((shifts[0] + shifts[1], first + j));
             }
         }
         links
     }
+}
+
+/// True for places along both beams, in elements, that one point may have: at the same node, or
+/// within `most` of each other.
+fn is_near(kind: PairPointKind, shifts: [f64; 2], most: f64) -> bool {
+    let is_same_node = match kind {
+        PairPointKind::Closest => true,
+        PairPointKind::NodeOfFirst => shifts[0] == 0.0,
+        PairPointKind::NodeOfSecond => shifts[1] == 0.0,
+    };
+    is_same_node && shifts.iter().all(|&shift| shift <= most)
 }

@@ -35,7 +35,7 @@ impl<'a> PairRole<'a> {
         at.amplitude[self.law_of(pair.meeting).amplitude] != 0.0
     }
 
-    fn slot_of(self, pair: &ListedPair) -> Slot {
+    pub(super) fn slot_of(self, pair: &ListedPair) -> Slot {
         self.pairs.nodes_of(pair)[0][0].node.u
     }
 
@@ -99,6 +99,15 @@ impl<'a> PairRole<'a> {
             at.contacts.pairs.nodes = Arc::new(self.pairs.poses(at));
         }
         if accepts { taken - self.stick_energy(at) } else { 0.0 }
+    }
+
+    /// Shares forces as the law of a stage that begins wants it.
+    pub fn share_anew(self, at: &mut State) {
+        let pairs = &at.contacts.pairs;
+        if !pairs.list.is_empty() {
+            let blend = self.pairs.blend(&pairs.list, &self.pairs.places(at), at.contacts.regime);
+            at.contacts.pairs.blend = Arc::new(blend);
+        }
     }
 
     /// Makes the list of an accepted state.
@@ -199,15 +208,6 @@ impl<'a> PairRole<'a> {
         let list = &from.contacts.pairs.list;
         if list.is_empty() {
             return None;
-        }
-        let mut turned = None;
-        self.each(to, &mut |point| {
-            if point.state.traction.turned_over {
-                turned = Some(self.slot_of(&point.pair));
-            }
-        });
-        if turned.is_some() {
-            return turned;
         }
         let [before, after] = [from, to].map(|at| self.pairs.places(at));
         // A fast approach from far away may come near, but for a tenth of the distance in contact.
