@@ -154,12 +154,17 @@ impl Chain {
         gap > 0.0 && self.nodes.iter().all(|node| (place(node) - middle).squared() < reach * reach)
     }
 
-    /// The number of the last point in memory of each candidate that touches the same thing: the
-    /// nearest ones first, each once.
-    pub(super) fn matched(&self, candidates: &[Candidate], memory: Option<&ChainMemory>) -> Vec<Option<usize>> {
+    /// The number of the last point in memory of each candidate: the nearest ones first, each once.
+    /// Both touch the same thing; what remains may pass from edge to edge where `surface` has facets.
+    pub(super) fn matched(
+        &self,
+        surface: &Surface,
+        candidates: &[Candidate],
+        memory: Option<&ChainMemory>,
+    ) -> Vec<Option<usize>> {
         let mut partner = vec![None; candidates.len()];
         let Some(memory) = memory else { return partner };
-        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        let mut pairs: Vec<(bool, f64, usize, usize)> = Vec::new();
         let mut first = 0;
         for (k, candidate) in candidates.iter().enumerate() {
             let along = candidate.along();
@@ -167,12 +172,15 @@ impl Chain {
                 first += 1;
             }
             let near = memory.points[first..].iter().take_while(|point| point.place <= along + LARGEST_SHIFT);
-            let alike = near.enumerate().filter(|(_, point)| point.edge == candidate.edge);
-            pairs.extend(alike.map(|(j, point)| ((point.place - along).abs(), k, first + j)));
+            let is_other = |point: &PointMemory| point.edge != candidate.edge;
+            let may_pass =
+                |point: &PointMemory| surface.has_facets() && point.edge.is_some() && candidate.edge.is_some();
+            let alike = near.enumerate().filter(|(_, point)| !is_other(point) || may_pass(point));
+            pairs.extend(alike.map(|(j, point)| (is_other(point), (point.place - along).abs(), k, first + j)));
         }
-        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        pairs.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
         let mut taken = vec![false; memory.points.len()];
-        for (_, k, j) in pairs {
+        for (_, _, k, j) in pairs {
             if partner[k].is_none() && !taken[j] {
                 partner[k] = Some(j);
                 taken[j] = true;

@@ -24,7 +24,7 @@ use super::{
     Roles, TangentForm,
 };
 use crate::kernel::contact::{
-    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Status,
+    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Side, Status,
     add_point,
 };
 use crate::kernel::{ElementSystem, Weights};
@@ -106,7 +106,7 @@ impl SurfaceContacts {
         let carrier = surface.carrier(at, weights);
         let memory = at.contacts.chains.get(number);
         let candidates = chain.candidates(&surface.surface, &carrier, memory, at);
-        let partners = chain.matched(&candidates, memory);
+        let partners = chain.matched(&surface.surface, &candidates, memory);
         ChainNow { chain, laws: &self.laws[chain.contact], surface, carrier, memory, at, candidates, partners }
     }
 
@@ -123,8 +123,9 @@ impl SurfaceContacts {
     /// True if no chain touches, or touched, and none has friction, which follows nodes that do not
     /// touch: there is nothing to remember.
     fn is_clear(&self, at: &State) -> bool {
-        let is_clear = |number: usize| !self.laws[self.chains[number].contact].rubs() && !self.is_near(number, at);
-        self.pairs.is_empty() && (0..self.chains.len()).all(is_clear)
+        let is_clear =
+            |chain: &Chain| !self.laws[chain.contact].rubs() && chain.is_far(&self.surfaces[chain.surface], at);
+        self.pairs.is_empty() && !at.contacts.touches() && self.chains.iter().all(is_clear)
     }
 
     /// Writes a new memory of all chains.
@@ -218,6 +219,30 @@ impl SurfaceContacts {
         self.pairs().judge_penalty(at);
     }
 
+    /// The part of an increment, up to 1, on which no node goes deeper into a surface around it by more
+    /// than its radius. A long wire in a tube is nearly without stiffness until it touches: a whole
+    /// correction may lead far out of the tube, where all nodes push back at once.
+    fn part_within_reach(&self, at: &State, increment: &[Vec3]) -> f64 {
+        let mut part = 1.0f64;
+        if at.contacts.regime == ContactRegime::Penalty {
+            return part;
+        }
+        for (chain, _, surface) in self.acting(at).filter(|(_, _, surface)| surface.surface.side == Side::Inside) {
+            let carrier = surface.carrier(at, Weights::NONE);
+            let carried = surface.slots().map_or(Vec3::ZERO, |[u, _]| increment[u as usize]);
+            for node in &chain.nodes {
+                let moved = increment[node.node.u as usize] - carried;
+                if moved.norm() > chain.radius {
+                    let from = carrier.on_surface(node.place + at.q[node.node.u as usize]);
+                    let to = from + carrier.rotation.r.transpose_mul(moved);
+                    let [before, after] = [from, to].map(|y| surface.surface.value(y, chain.radius));
+                    part = part.min(part_of_way(before, after, chain.radius));
+                }
+            }
+        }
+        part
+    }
+
     fn damping_power(&self, at: &State) -> f64 {
         let mut power = 0.0;
         if at.contacts.regime == ContactRegime::Penalty && self.laws.iter().any(|laws| laws.damping != 0.0) {
@@ -228,6 +253,14 @@ impl SurfaceContacts {
         }
         power
     }
+}
+
+/// The part of a way, up to 1, on which a section of a radius does not go deeper by more than that;
+/// distances of its centre are given before and after it.
+fn part_of_way(before: Option<f64>, after: Option<f64>, radius: f64) -> f64 {
+    let (Some(before), Some(after)) = (before, after) else { return 1.0 };
+    let allowed = (before - radius).max(0.0) + radius;
+    if before - after > allowed { allowed / (before - after) } else { 1.0 }
 }
 
 /// Places, followed by the middles between each two neighbours.
@@ -556,7 +589,7 @@ impl Contacts for SurfaceContacts {
     }
 
     fn safe_part(&self, at: &State, increment: &[Vec3]) -> f64 {
-        self.pairs().safe_part(at, increment)
+        self.pairs().safe_part(at, increment).min(self.part_within_reach(at, increment))
     }
 
     fn augment(&self, at: &mut State) {
@@ -581,7 +614,8 @@ impl Contacts for SurfaceContacts {
     }
 
     fn accept(&self, before: &State, at: &mut State) {
-        if self.is_clear(at) && at.contacts.damping_power == 0.0 {
+        at.contacts.is_clear = self.is_clear(at);
+        if at.contacts.is_clear && at.contacts.damping_power == 0.0 {
             at.contacts.factor = at.contacts.first_factor;
             return;
         }
@@ -611,7 +645,7 @@ impl Contacts for SurfaceContacts {
                     slides.push(point.state.status() == Status::Slides);
                 }
             });
-            let partners = chain.chain.matched(&active, memory);
+            let partners = chain.chain.matched(&chain.surface.surface, &active, memory);
             let is_other = active.len() != memory.map_or(0, |memory| memory.points.len());
             if slides.contains(&true) {
                 change = ContactChange::Slides;
@@ -691,6 +725,9 @@ impl Contacts for SurfaceContacts {
 
     fn energy(&self, at: &State) -> f64 {
         let mut energy = 0.0;
+        if at.contacts.is_clear {
+            return energy;
+        }
         if at.contacts.regime == ContactRegime::Augmented {
             // The memory holds the tractions of the state.
             for (number, chain) in self.chains.iter().enumerate() {

@@ -51,6 +51,12 @@ impl Surface {
         }
     }
 
+    /// True if a contact may pass from one edge to another: edges of meshes that stand for a smooth
+    /// surface.
+    pub fn has_facets(&self) -> bool {
+        matches!(self.shape, Shape::Mesh(_))
+    }
+
     /// Numbers of the edges that beams can touch, in ascending order: all that are within `reach` of
     /// the line between two points, and maybe others.
     pub fn edges_near(&self, line: [Vec3; 2], reach: f64) -> Vec<u32> {
