@@ -97,6 +97,34 @@ values = [0, 1, 0]
 """
 
 
+FLOOR = """\
+[point]
+root = [0, 0, 0]
+tip = [{length!r}, 0, 0]
+
+[[support]]
+at = "root"
+fix = "all"
+
+[[load]]
+along = "b"
+force = [0, 0, {weight!r}]
+
+[[surface]]
+name = "floor"
+kind = "plane"
+point = [0, 0, {height!r}]
+normal = [0, 0, 1]
+
+[[contact]]
+name = "rest"
+beams = ["b"]
+surfaces = ["floor"]
+radius = {radius!r}
+penetration = 1e-6
+"""
+
+
 def scene_text(scene):
     """Points, supports and loads of a scene, and the course of its beam."""
     if scene in scenes.CIRCLES:
@@ -107,6 +135,10 @@ def scene_text(scene):
         return BEND.format(middle=middle, tip=tip, force=scenes.BEND_FORCE), 'arc = ["root", "middle", "tip"]'
     if scene == "S3":
         return RIGHT_ANGLE.format(length=scenes.LENGTH), 'through = ["root", "elbow", "tip"]'
+    if scene == "S6":
+        text = FLOOR.format(length=scenes.LENGTH, weight=-scenes.FLOOR_WEIGHT, radius=scenes.FLOOR_RADIUS,
+                            height=-scenes.FLOOR_GAP - scenes.FLOOR_RADIUS)
+        return text, 'through = ["root", "tip"]'
     start, end = list(scenes.FLYING_START), list(scenes.FLYING_END)
     return FLYING.format(start=start, end=end), 'through = ["start", "end"]'
 

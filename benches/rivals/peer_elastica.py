@@ -1,7 +1,8 @@
 """PyElastica: a Cosserat rod on staggered grids with the explicit position Verlet scheme; an iteration is a step.
 
 S3 is one rod with a right angle in its rest curvature. The clamp holds the first node and the first element, half an
-element more than a clamp should, which is an error of first order in the length of elements.
+element more than a clamp should, which is an error of first order in the length of elements. In S6 a linear damper
+brings the rod to rest on a plane.
 """
 
 import importlib.metadata
@@ -18,7 +19,8 @@ data = scenes.SECTIONS[scene]
 elbow = n // 2
 
 
-class Simulator(elastica.BaseSystemCollection, elastica.Constraints, elastica.Forcing):
+class Simulator(elastica.BaseSystemCollection, elastica.Constraints, elastica.Forcing, elastica.Damping,
+                elastica.Contact):
     pass
 
 
@@ -38,6 +40,24 @@ class Pulse(elastica.NoForces):
     def apply_torques(self, system, time=0.0):
         pulse = scenes.flying_pulse(time)
         system.external_torques[..., 0] += system.director_collection[..., 0] @ np.array([0, -pulse / 2, -pulse])
+
+
+class Weight(elastica.NoForces):
+    """The weight per length of S6."""
+
+    def apply_forces(self, system, time=0.0):
+        system.external_forces[2] -= scenes.FLOOR_WEIGHT * system.mass / data["rhoA"]
+
+
+def lay_on_floor(simulator, rod):
+    """Adds weight, damping and a plane without friction."""
+    rod.radius[:] = scenes.FLOOR_RADIUS
+    height = -scenes.FLOOR_GAP - scenes.FLOOR_RADIUS
+    floor = elastica.Plane(plane_origin=np.array([0.0, 0.0, height]), plane_normal=np.array([0.0, 0.0, 1.0]))
+    simulator.append(floor)
+    simulator.add_forcing_to(rod).using(Weight)
+    simulator.dampen(rod).using(elastica.AnalyticalLinearDamper, damping_constant=1.0, time_step=h)
+    simulator.detect_contact_between(rod, floor).using(elastica.RodPlaneContact, k=300.0, nu=0.1)
 
 
 def make_rod():
@@ -72,10 +92,13 @@ def make_rod():
 simulator = Simulator()
 rod = make_rod()
 simulator.append(rod)
-if scene == "S3":
+if scene in ("S3", "S6"):
     simulator.constrain(rod).using(
         elastica.OneEndFixedBC, constrained_position_idx=(0,), constrained_director_idx=(0,))
-simulator.add_forcing_to(rod).using(Push if scene == "S3" else Pulse)
+if scene == "S6":
+    lay_on_floor(simulator, rod)
+else:
+    simulator.add_forcing_to(rod).using(Push if scene == "S3" else Pulse)
 simulator.finalize()
 stepper = elastica.PositionVerlet()
 time = np.float64(0.0)
@@ -90,4 +113,4 @@ with scenes.Clock() as clock:
             rows.append((time, rod.position_collection[2, elbow], rod.position_collection[2, -1]))
 places = rod.position_collection
 scenes.report(importlib.metadata.version("pyelastica"), np.isfinite(places).all(), steps, clock.cpu,
-              {"start": places[:, 0], "end": places[:, -1]}, rows if scene == "S3" else None)
+              {"start": places[:, 0], "middle": places[:, elbow], "end": places[:, -1]}, rows if scene == "S3" else None)

@@ -1,4 +1,5 @@
-"""MuJoCo: a chain of rigid links, ball joints with springs EI/l (2 EI/l at the clamp), Runge-Kutta of order 4.
+"""MuJoCo: a chain of rigid links, ball joints with springs EI/l (2 EI/l at the clamp), Runge-Kutta of order 4; in S6
+capsules on a plane without friction, joints damped, and the integrator `implicitfast`.
 
 The chain is inextensible and unshearable and bends and twists with one stiffness. Explicit: an iteration is a step.
 """
@@ -21,6 +22,9 @@ length = math.dist(places[0], places[1])
 axial, across = data["rhoJ"][0] * length, data["rhoJ"][1] * length
 
 
+DAMPING_TIME = 2.0  # of joints in S6, over their stiffness
+
+
 def quaternion(angle):
     """A turn about z."""
     return [math.cos(angle / 2), 0, 0, math.sin(angle / 2)]
@@ -32,7 +36,13 @@ def chain():
     spec.option.gravity = [0, 0, 0]
     spec.option.timestep = h
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    if scene == "S6":
+        spec.option.gravity = [0, 0, -scenes.FLOOR_WEIGHT / data["rhoA"]]
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1], condim=1, contype=0, conaffinity=1,
+                                pos=[0, 0, -scenes.FLOOR_GAP - scenes.FLOOR_RADIUS])
+    else:
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     mass = data["rhoA"] * length
     turned = across + mass * length**2 / 12
     body = spec.worldbody
@@ -49,6 +59,10 @@ def chain():
         joint = body.add_joint(type=mujoco.mjtJoint.mjJNT_BALL)
         stiffness = data["EI"] / length * (1 if i else 2)
         joint.stiffness = [stiffness] + [0] * (len(joint.stiffness) - 1)
+        if scene == "S6":
+            joint.damping = [DAMPING_TIME * stiffness] + [0] * (len(joint.damping) - 1)
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=[0, 0, 0, length, 0, 0], condim=1, contype=1,
+                          size=[scenes.FLOOR_RADIUS, 0, 0], conaffinity=0)
     body.add_site(name="end", pos=[length, 0, 0])
     return spec.compile()
 
@@ -61,6 +75,8 @@ end = model.site("end").id
 
 def push(t):
     """The loads act at the origin of the loaded body, MuJoCo wants them at its centre."""
+    if scene == "S6":
+        return
     if scene == "S3":
         force, moment = np.array([0, 0, scenes.right_angle_force(t)]), np.zeros(3)
     else:
@@ -83,4 +99,5 @@ with scenes.Clock() as clock:
 mujoco.mj_forward(model, state)
 ok = np.isfinite(state.qpos).all() and not any(warning.number for warning in state.warning)
 scenes.report(mujoco.__version__, ok, steps, clock.cpu,
-              {"start": state.xpos[loaded], "end": state.site_xpos[end]}, rows if scene == "S3" else None)
+              {"start": state.xpos[loaded], "middle": state.xpos[model.body(f"b{half}").id], "end": state.site_xpos[end]},
+              rows if scene == "S3" else None)

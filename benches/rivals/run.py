@@ -64,6 +64,7 @@ def group(scene, title, limit, cases, **settings):
 
 OTHER_INERTIA = "rotary inertia does not turn with the section: compare µs only"
 EXPLICIT = "explicit: an iteration is a step"
+REST = "steps until it rests"
 XARA = {"library": "xara"}
 OPENSEESPY = {"library": "openseespy"}
 SPACE = {"element": "3d"}
@@ -147,7 +148,15 @@ GROUPS = [
         case("mujoco", "rigid links, RK4", EXPLICIT),
         case("elastica", "h = 0.0025", EXPLICIT, step=0.0025),
     ], elements=20, step=0.01),
+    group("S6", "S6 beam that sags onto a floor, 50 elements", 1e-4, [
+        case("beamsim", "statics, 4 levels", levels=4),
+        case("mujoco", "rigid links, damped, implicitfast", REST, step=0.005),
+        case("elastica", "100 elements, damped, h = 0.00005", REST, elements=100, step=0.00005),
+    ], elements=50),
 ]
+
+
+SCENES = sorted({one["scene"] for one in GROUPS})
 
 
 class Failed(Exception):
@@ -294,6 +303,8 @@ def error_of(scene, result, reference):
         exact = {"tip": scenes.BEND_TIP}
     elif scene == "S5":
         exact = scenes.FLYING_ENDS
+    elif scene == "S6":
+        exact = {"middle": scenes.floor_middle()}
     else:
         exact = {"middle": scenes.roll_up_exact(scene, 0.5), "tip": scenes.roll_up_exact(scene, 1.0)}
     return worst(math.dist(result["places"][name], place) for name, place in exact.items())
@@ -422,7 +433,7 @@ def parse():
     repository = HERE.parent.parent
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--peers", type=chosen(list(PEERS)), default=list(PEERS), help="default: all")
-    parser.add_argument("--scenes", type=chosen(["S1", "S2", "S3", "S4", "S5"]), default=["S1", "S2", "S3", "S4", "S5"])
+    parser.add_argument("--scenes", type=chosen(SCENES), default=SCENES)
     parser.add_argument("--repeat", type=int, default=5, help="runs of each program (5)")
     parser.add_argument("--beamsim", type=Path, default=repository / "target" / "release" / "beamsim")
     parser.add_argument("--out", type=Path, help="file for the table; it is printed in any case")

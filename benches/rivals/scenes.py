@@ -15,13 +15,15 @@ SECTIONS = {
     "S2": {"EA": 1e7, "GA": 5e6, "GJ": 5e6 / 6, "EI": 1e7 / 12, "rhoA": 1.0, "rhoJ": (1.0, 1.0, 1.0)},
     "S3": {"EA": 1e6, "GA": 1e6, "GJ": 1e3, "EI": 1e3, "rhoA": 1.0, "rhoJ": (20.0, 10.0, 10.0)},
     "S5": {"EA": 1e4, "GA": 1e4, "GJ": 5e2, "EI": 5e2, "rhoA": 1.0, "rhoJ": (10.0, 10.0, 10.0)},
+    "S6": {"EA": 1e6, "GA": 1e6, "GJ": 1e2, "EI": 1e2, "rhoA": 1.0, "rhoJ": (0.01, 0.005, 0.005)},
 }
 SECTIONS["S4"] = SECTIONS["S1"]
 
 LENGTH = 10.0  # of the straight beams and of each leg of the right angle
 CIRCLES = {"S1": 1.0, "S4": 0.01}  # how far the end moment rolls the beam up
 BEND_RADIUS, BEND_ANGLE, BEND_FORCE = 100.0, math.pi / 4, 600.0
-END_TIME = {"S3": 30.0, "S5": 15.0}
+END_TIME = {"S3": 30.0, "S5": 15.0, "S6": 60.0}  # in S6 damped motion has come to rest
+FLOOR_GAP, FLOOR_RADIUS, FLOOR_WEIGHT = 0.01, 0.1, 0.0144  # S6: twice the weight per length that lays the tip flat
 FLYING_START, FLYING_END = (6.0, 0.0, 0.0), (0.0, 8.0, 0.0)  # the loads act at the start
 
 # S2: shooting and several programs. S3: largest and smallest uz, uz at t = 30. S5: ends at t = 15.
@@ -42,6 +44,13 @@ def roll_up_exact(scene, fraction):
     return (radius * math.sin(angle * fraction), radius * (1 - math.cos(angle * fraction)), 0.0)
 
 
+def floor_middle():
+    """Where the middle of the beam of S6 comes to lie by linear theory, if slope and moment vanish where it meets the floor."""
+    free = (72 * SECTIONS["S6"]["EI"] * FLOOR_GAP / FLOOR_WEIGHT) ** 0.25
+    part = 0.5 * LENGTH / free
+    return (0.5 * LENGTH, 0.0, -3 * FLOOR_GAP * (part**4 - 8 / 3 * part**3 + 2 * part**2))
+
+
 def right_angle_force(t):
     """Force along z at the elbow of S3."""
     return 50.0 * max(0.0, min(t, 2.0 - t))
@@ -59,7 +68,7 @@ def line(a, b, n):
 
 def nodes(scene, n):
     """The n + 1 nodes of a scene with n two-node elements, in order along the beam."""
-    if scene in CIRCLES:
+    if scene in CIRCLES or scene == "S6":
         return line((0.0, 0.0, 0.0), (LENGTH, 0.0, 0.0), n)
     if scene == "S2":
         angles = [BEND_ANGLE * i / n for i in range(n + 1)]

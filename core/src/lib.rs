@@ -38,6 +38,9 @@
 //!
 //! The modules stand in the order of their layers: each imports only those above it.
 
+// Whoever adds a variant to an enum is shown by the compiler where it matters.
+#![warn(clippy::wildcard_enum_match_arm)]
+
 pub mod failure;
 pub mod warning;
 

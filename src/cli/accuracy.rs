@@ -227,14 +227,12 @@ fn note_polylines(deck: &Deck) {
 
 /// The error of a study as the error of its deck, with the lines of the text.
 pub fn study_error(error: StudyError, path: &Path, loaded: &Loaded) -> CommandError {
-    match error {
-        StudyError::Deck(diagnostic) => CommandError::Deck(DeckError {
-            message: format!("1 error in {}", path.display()),
-            details: diagnostic.render(&path.display().to_string(), &loaded.text, console::styled()),
-            ..DeckError::default()
-        }),
-        other => other.into(),
-    }
+    let StudyError::Deck(diagnostic) = error else { return error.into() };
+    CommandError::Deck(DeckError {
+        message: format!("1 error in {}", path.display()),
+        details: diagnostic.render(&path.display().to_string(), &loaded.text, console::styled()),
+        ..DeckError::default()
+    })
 }
 
 fn print_found(name: &str, deck: &Deck, found: &Found, wanted: &Accuracy) {

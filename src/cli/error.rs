@@ -168,10 +168,10 @@ impl CommandError {
 
 impl From<OutputError> for CommandError {
     fn from(error: OutputError) -> Self {
-        match error {
-            OutputError::Locked(_) => Self::Locked(error.to_string()),
-            other => Self::io(other),
+        if matches!(error, OutputError::Locked(_)) {
+            return Self::Locked(error.to_string());
         }
+        Self::io(error)
     }
 }
 

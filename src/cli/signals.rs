@@ -62,11 +62,14 @@ pub fn caught() -> Option<i32> {
     }
 }
 
+/// Makes a file that may not grow an error of writing, not the end of the process.
+pub fn outlive_file_limits() {
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
+}
+
 /// When this returns signals are heard: no file is open before. If the system gives no thread for
 /// that, they end the process as they would anyway.
 pub fn listen() {
-    // A file that may not grow is an error of writing, not the end of the process.
-    let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
     let (sender, ready) = mpsc::channel();
     let hear_all = move || {
         let Ok(mut signals) = Signals::new(heard()) else { return };
@@ -83,6 +86,8 @@ pub fn listen() {
 /// The signals that are heard. Those that are switched off stay so: a hang-up by `nohup`, an
 /// interrupt by a shell that runs the command in the background.
 fn heard() -> Vec<i32> {
+    let ignored = ignored();
+    let is_ignored = |signal: i32| ignored.map(|mask| mask >> (signal - 1) & 1 == 1);
     let mut signals: Vec<i32> =
         [SIGINT, SIGTERM].into_iter().filter(|&signal| is_ignored(signal) != Some(true)).collect();
     if is_ignored(SIGHUP) == Some(false) {
@@ -91,13 +96,12 @@ fn heard() -> Vec<i32> {
     signals
 }
 
-/// True if the process was started with a signal switched off; `None` where the system does not
-/// tell.
-fn is_ignored(signal: i32) -> Option<bool> {
+/// Signals that were switched off when the process was started, a bit for each, from the lowest
+/// bit for signal 1; `None` where the system does not tell.
+fn ignored() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;
-    let mask = u64::from_str_radix(mask.trim(), 16).ok()?;
-    Some(mask >> (signal - 1) & 1 == 1)
+    u64::from_str_radix(mask.trim(), 16).ok()
 }
 
 /// A signal that was heard.

@@ -41,10 +41,10 @@ impl Status {
 
     /// The exit status after a failed simulation.
     pub fn of_failure(failure: &Failure) -> Self {
-        match failure {
-            Failure::Interrupted { signal, .. } => Self::after(*signal),
-            other => Self::of(other.kind()),
+        if let Failure::Interrupted { signal, .. } = failure {
+            return Self::after(*signal);
         }
+        Self::of(failure.kind())
     }
 
     /// The exit status of a process that a signal ended.

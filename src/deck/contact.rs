@@ -173,11 +173,6 @@ fn check_parties(table: &Table, contact: Contact) -> Option<Contact> {
         let message = "`with` and `self` are for beams alone: give `nodes` a contact of their own, with `surfaces`";
         return table.wrong_key("nodes", message);
     }
-    if meets_beams && contact.friction != [0.0; 2] {
-        let message = "friction between beams is not available: take `friction` out, or give beams and surfaces a \
-                       contact of their own";
-        return table.wrong_key("friction", message);
-    }
     Some(contact)
 }
 

@@ -143,10 +143,6 @@ const MOST_ITERATIONS: usize = 10_000;
 const ENERGY_LIMIT: f64 = 0.2;
 /// Default of `step_tolerance`.
 pub const STEP_TOLERANCE: f64 = 1e-4;
-/// Default of `tolerance`.
-const TOLERANCE: f64 = 1e-9;
-/// Default of `max_iterations`.
-const ITERATIONS: usize = 25;
 /// Default of `max_steps`, as a multiple of `steps`.
 const INCREMENTS_PER_STEP: usize = 10;
 
@@ -204,7 +200,7 @@ pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option
     };
     let frame = table.optional("frame", read_frame);
     let tolerance = read_tolerance(&table);
-    let max_iterations = table.whole_or("max_iterations", 1..=MOST_ITERATIONS, ITERATIONS);
+    let max_iterations = table.whole_or("max_iterations", 1..=MOST_ITERATIONS, StageKind::MAX_ITERATIONS);
     let until = table.optional("until", read_until);
     Some(Stage {
         body: body?,
@@ -293,7 +289,7 @@ fn read_step_tolerance(table: &Table) -> Option<Option<f64>> {
 
 fn read_tolerance(table: &Table) -> Option<f64> {
     if !table.has("tolerance") {
-        return Some(TOLERANCE);
+        return Some(StageKind::TOLERANCE);
     }
     let tolerance = table.positive("tolerance")?;
     if tolerance.value < 1.0 {

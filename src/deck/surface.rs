@@ -280,7 +280,7 @@ fn read_body(table: &Table, kind: SurfaceWord) -> Option<SurfaceBody> {
         SurfaceWord::Mesh => {
             let file = table.required_text("file");
             let scale = table.positive_or("scale", 1.0);
-            let at = table.optional("at", |context, item| read_point(context, item));
+            let at = table.optional("at", read_point);
             let axes = read_axes(table);
             Some(SurfaceBody::Mesh { file: file?, scale: scale?, at: at?, axes: axes? })
         }

@@ -3,7 +3,9 @@
 use super::compose::Composition;
 use super::contacts;
 use super::mesh::Mesh;
+use super::scheme::coefficients;
 use crate::deck::{self, Deck, Diagnostic, LoadTarget, MotionWhat, SectionBody, Spanned, StageBody};
+use beamsim_core::integrate::Stages;
 use beamsim_core::model::{StageSet, Support};
 use beamsim_core::system::Direction;
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -226,17 +228,13 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
     if composition.multipliers.is_empty() {
         return;
     }
-    use deck::SchemeWord::{GeneralizedAlpha, Hht, LieGeneralizedAlpha, Lobatto, Newmark};
     for stage in &deck.stages {
         let StageBody::Dynamic { scheme, .. } = stage.body else { continue };
-        let undamped = match scheme {
-            Newmark(_, gamma) => gamma <= 0.5,
-            Hht(alpha) => alpha == 0.0,
-            GeneralizedAlpha(rho) | LieGeneralizedAlpha(rho) => rho >= 1.0,
-            // Each step restores the rates of joints, but not those of stiff directions beside them.
-            Lobatto => !deck.beams.is_empty(),
-        };
-        if undamped {
+        let scheme = coefficients(scheme);
+        // With a balance in the middle each step restores the rates of joints, but not those of stiff directions
+        // beside them.
+        let restores_rates = scheme.stages == Stages::MiddleAndEnd && deck.beams.is_empty();
+        if !scheme.dissipates() && !restores_rates {
             let message = "joints with Lagrange multipliers need a scheme with numerical dissipation: otherwise \
                            accelerations and joint forces oscillate from step to step";
             let help = "use scheme = \"generalized_alpha\"; without dissipation the run may even fail to converge";

@@ -25,11 +25,11 @@ pub struct BeamElement<'m> {
 }
 
 impl BeamElement<'_> {
-    fn station(&self, xi: f64, gauss_weight: f64) -> Station {
-        let Part { piece, cover, .. } = self.beam.part_of_line(self.number);
+    fn station(&self, part: &Part, xi: f64, gauss_weight: f64) -> Station {
+        let &Part { piece, cover, .. } = part;
         let line = &self.beam.line;
         let (shape, slope) = shape_at(self.nodes.len(), xi);
-        let (tangent, jacobian) = line.pieces[piece].slope(self.between(&slope), cover);
+        let (tangent, jacobian) = line.pieces[piece].slope(|| self.between(&slope), cover);
         let t = cover.place(xi);
         let fraction = line.fraction(piece, t);
         Station {
@@ -86,7 +86,8 @@ impl ElementGeometry for BeamElement<'_> {
     }
 
     fn stations(&self, rule: Rule) -> Vec<Station> {
-        rule.points(self.nodes.len()).iter().map(|&(xi, weight)| self.station(xi, weight)).collect()
+        let part = self.beam.part_of_line(self.number);
+        rule.points(self.nodes.len()).iter().map(|&(xi, weight)| self.station(&part, xi, weight)).collect()
     }
 }
 
@@ -497,9 +498,12 @@ fn named_between<'a>(
 /// True if the path of a beam names a point.
 fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
     let found = deck.beams.iter().find(|b| b.name.value == beam);
-    found.is_some_and(|b| match &b.path {
-        deck::Path::Arc([_, Spanned { value: PointRef::Name(middle), .. }, _]) if middle == point => true,
-        path => corner_names(path).contains(&Some(point)),
+    found.is_some_and(|b| {
+        let is_middle = matches!(
+            &b.path,
+            deck::Path::Arc([_, Spanned { value: PointRef::Name(middle), .. }, _]) if middle == point
+        );
+        is_middle || corner_names(&b.path).contains(&Some(point))
     })
 }
 

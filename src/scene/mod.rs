@@ -17,6 +17,7 @@ mod output;
 mod path;
 mod planar;
 mod rehearsal;
+mod scheme;
 mod section;
 mod stress;
 mod surfaces;
@@ -31,14 +32,12 @@ pub use section::matrices as section_matrices;
 pub use stress::recovery as section_stresses;
 
 use crate::deck::{
-    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody, Target,
-    Words, words,
+    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, Severity, Spanned, StageBody, Target, Words, words,
 };
 use beamsim_core::effect::contact::SurfaceContacts;
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
-use beamsim_core::integrate::Scheme;
 use beamsim_core::model::{ElementInfo, ModelParts, StageKind};
 use beamsim_core::probe::{Figure, Need, Probe, ProfilePlace, StressPlace};
 use beamsim_core::run::{Approach, InitialMotion, Plan, Snapshot, Stage, StageWork, TimeStepping, Until, Warning};
@@ -431,7 +430,7 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
             StageBody::Modal { modes } => StageWork::Modal { modes },
             StageBody::Buckling { modes } => StageWork::Buckling { modes },
             StageBody::Dynamic { end, step, scheme, step_tolerance, energy_limit } => {
-                let scheme = coefficients(scheme);
+                let scheme = scheme::coefficients(scheme);
                 StageWork::Dynamic(TimeStepping { end, step, scheme, adaptive: step_tolerance, energy_limit })
             }
         };
@@ -440,16 +439,6 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
         stages.push(Stage { work, tolerance, max_iterations, until, rotating: stage.frame.is_some() });
     }
     stages
-}
-
-fn coefficients(scheme: SchemeWord) -> Scheme {
-    match scheme {
-        SchemeWord::Newmark(beta, gamma) => Scheme::newmark(beta, gamma),
-        SchemeWord::Hht(alpha) => Scheme::hht(alpha),
-        SchemeWord::GeneralizedAlpha(rho) => Scheme::generalized_alpha(rho),
-        SchemeWord::LieGeneralizedAlpha(rho) => Scheme::lie_generalized_alpha(rho),
-        SchemeWord::Lobatto => Scheme::lobatto(),
-    }
 }
 
 fn expectations(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> Vec<Expectation> {

@@ -114,6 +114,8 @@ pub struct CentreLine {
     before: Vec<f64>,
     /// Angle of axes 2 and 3 about axis 1
     twist: Along<1>,
+    /// The section axes of each straight piece without twist, which are the same everywhere on it
+    constant_axes: Vec<Option<Mat3>>,
 }
 
 impl Piece {
@@ -162,10 +164,11 @@ impl Piece {
     /// The unit tangent of an element and its length over that of xi; `stretch`: derivative of the
     /// interpolated line over xi. On a straight piece equal elements have the same, without the
     /// round-off in the places of their nodes, so that they can share data.
-    pub fn slope(&self, stretch: Vec3, cover: Cover) -> (Vec3, f64) {
+    pub fn slope(&self, stretch: impl FnOnce() -> Vec3, cover: Cover) -> (Vec3, f64) {
         match &self.curve {
             Curve::Line => (self.tangent(0.0), cover.of(0.5 * self.length)),
             Curve::Arc { .. } | Curve::Helix(_) | Curve::Spline { .. } => {
+                let stretch = stretch();
                 (stretch * (1.0 / stretch.norm()), stretch.norm())
             }
         }
@@ -208,12 +211,20 @@ impl CentreLine {
             before.push(length);
             length += piece.length;
         }
-        Self { pieces, length, before, twist }
+        let constant_axes = |piece: &Piece| match piece.curve {
+            Curve::Line if twist.is_zero() => Some(piece.untwisted_axes(piece.tangent(0.0))),
+            Curve::Line | Curve::Arc { .. } | Curve::Helix(_) | Curve::Spline { .. } => None,
+        };
+        let constant_axes = pieces.iter().map(constant_axes).collect();
+        Self { pieces, length, before, twist, constant_axes }
     }
 
     /// The section axes on the piece `piece` for the unit tangent `e1`, at the fraction `s` of the
     /// beam's length.
     pub fn axes(&self, piece: usize, e1: Vec3, s: f64) -> Mat3 {
+        if let Some(axes) = self.constant_axes[piece] {
+            return axes;
+        }
         let axes = self.pieces[piece].untwisted_axes(e1);
         let [angle] = self.twist.at(s);
         if angle == 0.0 {

@@ -3,9 +3,11 @@
 patch names, decks (by `beamsim verify`) or a test (by `cargo test`), then fails.
 
     tests/mutations/run.py [NAME ...] [--table FILE] [--target FOLDER] [--timeout SECONDS]
+    tests/mutations/run.py --applies
 
 A patch begins with lines `# mistake:`, `# names:` (decks, or `test module::name`), `# why:`. A mutant that does not
-apply or build is an error, not a success. Exit status: 0 all found, 1 a mutant survives, 2 an error of the suite.
+apply or build is an error, not a success; `--applies` only looks whether each one applies. Exit status: 0 all found,
+1 a mutant survives, 2 an error of the suite.
 Builds are incremental; where one has been killed and the next does not link, remove the target folder.
 """
 
@@ -146,8 +148,23 @@ def row(mutant, results):
     return f"| {mutant.mistake} | {what} | {how} |"
 
 
+def applies(mutants):
+    """Fails on patches that do not fit the sources any more, and on decks that are not there."""
+    with tempfile.TemporaryDirectory(prefix="beamsim-mutations-") as folder:
+        copy = Copy(Path(folder).resolve(), ROOT / "target" / "mutations", 0.0)
+        for mutant in mutants:
+            copy.must(["git", "apply", "--check", mutant.patch])
+            for deck in mutant.decks:
+                if not (copy.folder / deck).is_file():
+                    raise SuiteError(f"{mutant.name}: there is no {deck}")
+    print(f"{len(mutants)} patches apply")
+    return 0
+
+
 def run(arguments):
     mutants = [read(patch) for patch in sorted(HERE.glob("*.patch"))]
+    if arguments.applies:
+        return applies(mutants)
     unknown = set(arguments.names) - {mutant.name for mutant in mutants}
     if unknown:
         raise SuiteError(f"there is no patch {', '.join(sorted(unknown))}")
@@ -173,6 +190,7 @@ def run(arguments):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help="patches without their ending; else all")
+    parser.add_argument("--applies", action="store_true", help="only look whether the patches fit the sources")
     parser.add_argument("--table", type=Path, metavar="FILE", help="write the markdown table there too")
     parser.add_argument("--target", type=Path, default=ROOT / "target" / "mutations", help="kept between runs")
     parser.add_argument("--timeout", type=float, default=60.0, help="seconds a deck may take")

@@ -544,3 +544,21 @@ fn levels_with_friction_are_in_equilibrium() {
         assert!((held - wanted).abs() < 1e-5, "row {row}, load factor {load}: {held}");
     }
 }
+
+/// A level that fails for one stiffness of its contacts is cut back with the stiffness that it began with: wires of
+/// any number of elements come through the first curve.
+#[test]
+fn coarse_guidewires_come_through_the_first_curve() {
+    let deck = std::fs::read_to_string("decks/contact/scenes/guidewire.toml").unwrap();
+    let pushed = |elements: usize| {
+        let settings = [format!("beam.0.elements={elements}"), "motion.0.ux=50".into(), "stage.0.steps=50".into()];
+        simulate(&beamsim::deck::apply(&deck, &settings).unwrap())
+    };
+    // With 500 elements
+    let (force, height) = (0.01064, 9.0976);
+    for elements in [60, 100] {
+        let simulation = pushed(elements);
+        let errors = [simulation.end("tail.fx") / force - 1.0, simulation.end("tip.uy") / height - 1.0];
+        assert!(errors[0].abs() < 0.03 && errors[1].abs() < 1e-3, "{elements} elements: {errors:?}");
+    }
+}

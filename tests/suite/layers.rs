@@ -19,7 +19,7 @@ const DECK_ROWS: [&str; 2] = ["beamsim_core::effect::joint::JointKind", "beamsim
 const BELOW_ALL: [&str; 2] = ["failure", "warning"];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 23] = [
+const CRATES: [(&str, &[&str]); 22] = [
     ("rayon", &["core/src/threads.rs"]),
     (
         "faer",
@@ -42,7 +42,6 @@ const CRATES: [(&str, &[&str]); 23] = [
     ("cpu_time", &["src/study/cost/trial.rs"]),
     ("clap", &["src/cli/"]),
     ("indicatif", &["src/cli/"]),
-    ("ctrlc", &["src/cli/"]),
     ("signal_hook", &["src/cli/"]),
     // The scene hands the resolved deck through to run.json.
     (

@@ -31,6 +31,7 @@ mod linear_stages;
 mod masses;
 mod mechanics;
 mod mechanisms;
+mod pair_friction;
 mod placed;
 mod planar;
 mod plot;

@@ -96,6 +96,11 @@ impl Scheme {
         Self { stages: Stages::MiddleAndEnd, ..Self::newmark(0.25, 0.5) }
     }
 
+    /// True if high frequencies die away, at second order: gamma exceeds 1/2.
+    pub fn dissipates(&self) -> bool {
+        self.gamma > 0.5
+    }
+
     /// The lag of the algorithmic acceleration in steps: it belongs to the time t + lag h.
     pub fn lag(&self) -> f64 {
         self.alpha_m - self.alpha_f

@@ -41,7 +41,7 @@ pub struct Station {
 /// The points of an element that are summed over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// For internal forces
+    /// For internal forces: one Gauss point less than nodes, which avoids shear locking
     Inner,
     /// For mass and line loads
     Volume,

@@ -227,10 +227,10 @@ impl Failure {
     /// True if the deck itself asks for what cannot be: in a stage that cannot begin, or with a
     /// mechanism before anything is loaded.
     pub fn is_of_start(&self) -> bool {
-        match self {
-            Self::Singular { at, .. } => at.stage == 1 && at.time == 0.0 && at.load == 0.0,
-            other => other.kind().cause() == Cause::Deck,
+        if let Self::Singular { at, .. } = self {
+            return at.stage == 1 && at.time == 0.0 && at.load == 0.0;
         }
+        self.kind().cause() == Cause::Deck
     }
 
     /// True if no balance was found: another way to it may find one.

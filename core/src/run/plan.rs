@@ -84,19 +84,19 @@ pub struct Stage {
     pub rotating: bool,
 }
 
-/// The tolerance of stages that name none: the part of the largest forces that may be out of balance.
-const TOLERANCE: f64 = 1e-9;
-
-/// The limit of Newton's iterations of stages that name none
-const MAX_ITERATIONS: usize = 25;
-
 /// The part of the largest energies so far by which the total may grow, in dynamic stages that name none
 const ENERGY_LIMIT: f64 = 0.2;
 
 impl Stage {
     /// A stage seen from a frame at rest, with the usual tolerance.
     pub fn new(work: StageWork) -> Self {
-        Self { work, tolerance: TOLERANCE, max_iterations: MAX_ITERATIONS, until: None, rotating: false }
+        Self {
+            work,
+            tolerance: StageKind::TOLERANCE,
+            max_iterations: StageKind::MAX_ITERATIONS,
+            until: None,
+            rotating: false,
+        }
     }
 
     /// So many equal load levels, with smaller steps where one is not reached at once.

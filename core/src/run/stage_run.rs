@@ -246,11 +246,10 @@ impl StageRun<'_> {
     }
 
     /// Takes an earlier state as the present one, and as the last good one.
-    pub fn go_back_to(&mut self, state: &State) {
+    pub fn go_back_to(&mut self, state: &State) -> Result<(), Failure> {
         self.state.copy_from(state);
         self.good.copy_from(state);
-        // A failure for want of memory shows in the next attempt.
-        self.fit_assembly().unwrap_or_default();
+        self.fit_assembly()
     }
 
     /// Shows a row to the observer.

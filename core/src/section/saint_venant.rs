@@ -66,7 +66,7 @@ impl StiffnessField {
                 Tangent::Fixed(beta) => {
                     RegionStiffness::Constant(rotated_stiffness(&stiffness, &material_axes(beta, region.theta)))
                 }
-                tangent => RegionStiffness::Curved(stiffness, region.theta, tangent),
+                tangent @ Tangent::Around { .. } => RegionStiffness::Curved(stiffness, region.theta, tangent),
             });
         }
         Ok(Self { regions })

@@ -3,7 +3,8 @@
 
 use super::block::BlockSolver;
 use super::constraints::Constraints;
-use crate::system::{Pattern, Slot, Symmetry, System};
+use crate::kernel::WIDTH;
+use crate::system::{Pattern, Slot, Symmetry, System, Tile};
 use std::cell::OnceCell;
 
 /// A factorisation L D L^T for counting negative pivots, beside a solver whose own factorisation
@@ -53,10 +54,17 @@ pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
 /// The first column of tiles with an entry that differs from its mirror image, from column `first`
 /// on and then from the beginning. `None` if the tangent is symmetric.
 pub(super) fn unsymmetric_column(pattern: &Pattern, values: &[f64], first: usize) -> Option<usize> {
-    if pattern.symmetry == Symmetry::Whole {
-        return None;
+    match pattern.symmetry {
+        Symmetry::Whole => None,
+        Symmetry::BetweenNodeBlocks | Symmetry::None if pattern.width() == WIDTH => {
+            unsymmetric_column_in::<WIDTH>(pattern, values, first)
+        }
+        Symmetry::BetweenNodeBlocks | Symmetry::None => unsymmetric_column_in::<3>(pattern, values, first),
     }
-    let width = pattern.width();
+}
+
+/// See [`unsymmetric_column`], for tiles of the width W.
+fn unsymmetric_column_in<const W: usize>(pattern: &Pattern, values: &[f64], first: usize) -> Option<usize> {
     let entry = |tile: usize, r: usize, c: usize| values[pattern.storage.entry(tile, r, c)];
     let largest = OnceCell::new();
     let diagonal = |column: usize, k: usize| pattern.tile(column, column).map_or(0.0, |tile| entry(tile, k, k));
@@ -64,6 +72,7 @@ pub(super) fn unsymmetric_column(pattern: &Pattern, values: &[f64], first: usize
         0.0 => largest.get_or_init(|| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()))).sqrt(),
         diagonal => diagonal.abs().sqrt(),
     };
+    let tile_at = |place: usize| -> &Tile<W> { &values[place..].as_chunks::<W>().0.as_chunks::<W>().0[0] };
     let is_unsymmetric = |column: usize| {
         let below = pattern.rows_of(column).iter().map(|&row| row as usize);
         let below = below.filter(|&row| row > column && !pattern.symmetry.halves());
@@ -72,10 +81,14 @@ pub(super) fn unsymmetric_column(pattern: &Pattern, values: &[f64], first: usize
                 // Every off-diagonal tile has a mirrored one.
                 return true;
             };
-            let is_diagonal = row == column;
-            let mut pairs = (0..width).flat_map(|c| (if is_diagonal { c + 1 } else { 0 }..width).map(move |r| (r, c)));
+            let [tile, mirror] = [tile, mirror].map(tile_at);
+            // Most tiles are symmetric to the last bit.
+            if is_mirrored(tile, mirror) {
+                return false;
+            }
+            let mut pairs = (0..W).flat_map(|c| (0..W).map(move |r| (r, c)));
             pairs.any(|(r, c)| {
-                let difference = (entry(tile, r, c) - entry(mirror, c, r)).abs();
+                let difference = (tile[c][r] - mirror[r][c]).abs();
                 let allowed = || SYMMETRY_TOLERANCE * root(column, c) * root(row, r);
                 difference.is_nan() || (difference > 0.0 && difference > allowed())
             })
@@ -84,4 +97,15 @@ pub(super) fn unsymmetric_column(pattern: &Pattern, values: &[f64], first: usize
     let count = pattern.node_blocks.count();
     let first = first.min(count);
     (first..count).chain(0..first).find(|&column| is_unsymmetric(column))
+}
+
+/// True if a tile equals the transpose of another; NaN equals nothing.
+fn is_mirrored<const W: usize>(tile: &Tile<W>, mirror: &Tile<W>) -> bool {
+    let mut equal = true;
+    for (c, line) in tile.iter().enumerate() {
+        for (r, entry) in line.iter().enumerate() {
+            equal &= *entry == mirror[r][c];
+        }
+    }
+    equal
 }

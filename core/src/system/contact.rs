@@ -92,9 +92,10 @@ pub struct PointMemory {
     pub multiplier: f64,
     /// g, the gap, a length
     pub gap: f64,
-    /// t0, the traction at the last converged state, in the axes of the surface
+    /// t0, the traction at the last converged state, in the axes of the surface; of beams in global
+    /// axes
     pub traction: Vec3,
-    /// n0, the normal at the last converged state, in the axes of the surface
+    /// n0, the normal at the last converged state, in the same axes
     pub normal: Vec3,
     /// True if it slid at the last converged state
     pub slides: bool,
@@ -123,6 +124,9 @@ pub struct PairsMemory {
     pub margin: f64,
     /// Points with a force, in the order of their meetings and places
     pub points: Arc<Vec<PairPointMemory>>,
+    /// Places and rotations of the nodes of all beams at the last converged state (global axes);
+    /// empty without friction, and before the first state
+    pub nodes: Arc<Vec<NodeBefore>>,
 }
 
 /// Two beam elements near each other.
@@ -157,7 +161,7 @@ pub struct PairPointMemory {
     pub on_second: f64,
     /// The part of the force that it carries
     pub weight: f64,
-    /// Its place on the first beam, its force without the weight, and the push on the first beam
-    /// with it
+    /// Its place on the first beam; its force and its traction (global axes) without the weight, and
+    /// the push on the first beam with it
     pub point: PointMemory,
 }

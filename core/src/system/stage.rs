@@ -16,6 +16,11 @@ pub enum StageKind {
 }
 
 impl StageKind {
+    /// Tolerance of stages that name none: the part of the largest forces that may be out of balance.
+    pub const TOLERANCE: f64 = 1e-9;
+    /// Limit of Newton's iterations, of stages that name none.
+    pub const MAX_ITERATIONS: usize = 25;
+
     /// True if time advances: inertia and damping act, and histories are functions of time.
     pub fn advances_time(self) -> bool {
         match self {

@@ -5,6 +5,7 @@ use crate::deck::{
     self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, SectionBody, Shape, Spanned,
     StageBody, SurfaceMotion,
 };
+use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
 use crate::scene::names::{self, unknown};
 use crate::scene::path;
@@ -16,6 +17,7 @@ use beamsim_core::effect::contact::{
 use beamsim_core::kernel::contact::law::damping_of;
 use beamsim_core::model::Amplitude;
 use beamsim_core::run::Driven;
+use beamsim_core::system::Slot;
 use beamsim_core::tensor::Vec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -46,7 +48,7 @@ struct PairParts {
 }
 
 impl Composer<'_> {
-    pub(super) fn contacts(&mut self) {
+    pub(super) fn contacts(&mut self, connections: &[FoundJoint]) {
         let deck = self.deck;
         let is_off = !deck.effects.allow(EffectWord::Contact);
         if deck.contacts.is_empty() || is_off {
@@ -60,7 +62,7 @@ impl Composer<'_> {
         for contact in &deck.contacts {
             self.add_contact(contact, &surfaces, &mut out, &mut pairs);
         }
-        out.pairs = BeamPairs::new(pairs.beams, pairs.meetings);
+        out.pairs = BeamPairs::new(pairs.beams, pairs.meetings, &self.connected(connections));
         // Contacts keep the numbers of the tables of surfaces.
         let Some(surfaces) = surfaces.into_iter().collect::<Option<Vec<_>>>() else { return };
         out.surfaces = surfaces;
@@ -77,6 +79,15 @@ impl Composer<'_> {
         self.reason(NAME, true, reason);
         self.out.contacts = Some(out.clone());
         self.out.effects.push(out);
+    }
+
+    /// The slots of displacement of nodes that joints connect.
+    fn connected(&self, connections: &[FoundJoint]) -> Vec<[Slot; 2]> {
+        let slots = |joint: &FoundJoint| {
+            let [a, b] = joint.nodes;
+            Some([a?, b?].map(|node| self.mesh.nodes[node].node.u))
+        };
+        connections.iter().filter_map(slots).collect()
     }
 
     fn report(&mut self, diagnostic: Diagnostic) {
@@ -337,8 +348,11 @@ fn reason_of(deck: &Deck, out: &SurfaceContacts) -> String {
             named.push(format!("{} more pairs of beams", out.pairs.len() - NAMED_MEETINGS));
         }
         let named = named.join(", ");
-        parts
-            .push(format!("{named} (not where they are near each other along a beam, or near a node that they share)"));
+        let count = out.pairs.element_pairs();
+        parts.push(format!(
+            "{named}: {count} pair(s) of elements (not those near each other along a beam, or near a node that they \
+             share or a joint)"
+        ));
     }
     let idle = idle_names(deck);
     if !idle.is_empty() {

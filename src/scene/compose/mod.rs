@@ -150,7 +150,7 @@ pub fn compose(
     let along = composer.line_loads();
     composer.node_loads(along);
     composer.fading_inertia();
-    composer.contacts();
+    composer.contacts(connections);
     composer.parts();
     composer.never();
     composer.out

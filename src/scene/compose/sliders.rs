@@ -79,7 +79,19 @@ impl Composer<'_> {
                 let beam = &self.mesh.beams[number];
                 let is_within = |fraction: f64| (from - 1e-12..=to + 1e-12).contains(&fraction);
                 let nodes = beam.nodes.iter().zip(&beam.fractions).filter(|(_, fraction)| is_within(**fraction));
-                Some(nodes.map(|(&node, _)| node).collect())
+                let nodes: Vec<usize> = nodes.map(|(&node, _)| node).collect();
+                if nodes.is_empty() {
+                    let name = &beam.name;
+                    let message = format!("no node of beam `{name}` is in the `part` from {from} to {to}: none slides");
+                    let spacing = 1.0 / (beam.nodes.len() - 1) as f64;
+                    let help = format!(
+                        "name a longer part, or more `elements`: nodes of `{name}` are about {spacing:.3} of its \
+                         length apart"
+                    );
+                    self.diagnostics.push(Diagnostic::error(message, table.span.clone()).help(help));
+                    return None;
+                }
+                Some(nodes)
             }
         }
     }

@@ -166,17 +166,23 @@ impl Chain {
         let Some(memory) = memory else { return partner };
         let mut pairs: Vec<(bool, f64, usize, usize)> = Vec::new();
         let mut first = 0;
+        // A ring goes on at its start.
+        let goes_round = self.is_closed();
         for (k, candidate) in candidates.iter().enumerate() {
             let along = candidate.along();
-            while first < memory.points.len() && memory.points[first].place < along - LARGEST_SHIFT {
+            let points = &memory.points;
+            while !goes_round && first < points.len() && points[first].place < along - LARGEST_SHIFT {
                 first += 1;
             }
-            let near = memory.points[first..].iter().take_while(|point| point.place <= along + LARGEST_SHIFT);
-            let is_other = |point: &PointMemory| point.edge != candidate.edge;
-            let may_pass =
-                |point: &PointMemory| surface.has_facets() && point.edge.is_some() && candidate.edge.is_some();
-            let alike = near.enumerate().filter(|(_, point)| !is_other(point) || may_pass(point));
-            pairs.extend(alike.map(|(j, point)| (is_other(point), (point.place - along).abs(), k, first + j)));
+            let may_be_near = |point: &&PointMemory| goes_round || point.place <= along + LARGEST_SHIFT;
+            for (j, point) in points[first..].iter().take_while(may_be_near).enumerate() {
+                let shift = self.shift(point.place, along);
+                let is_other = point.edge != candidate.edge;
+                let may_pass = surface.has_facets() && point.edge.is_some() && candidate.edge.is_some();
+                if shift <= LARGEST_SHIFT && (!is_other || may_pass) {
+                    pairs.push((is_other, shift, k, first + j));
+                }
+            }
         }
         pairs.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
         let mut taken = vec![false; memory.points.len()];
@@ -212,10 +218,12 @@ impl SeenChain<'_> {
 
     /// The elements beside points that had a force.
     fn remembered(&self) -> Vec<usize> {
-        let last = self.chain.elements() as f64 - 1.0;
+        let count = self.chain.elements() as isize;
+        let is_closed = self.chain.is_closed();
+        let element = |k: isize| if is_closed { k.rem_euclid(count) } else { k.clamp(0, count - 1) };
         let beside = |place: f64| {
-            let [from, to] = [-LARGEST_SHIFT, LARGEST_SHIFT].map(|d| (place + d).floor().clamp(0.0, last) as usize);
-            from..=to
+            let [from, to] = [-LARGEST_SHIFT, LARGEST_SHIFT].map(|shift| (place + shift).floor() as isize);
+            (from..=to).map(|k| element(k) as usize)
         };
         self.points.iter().flat_map(|point| beside(point.place)).collect()
     }
@@ -308,8 +316,8 @@ impl SeenChain<'_> {
         let off_chord = |i: usize| (places[i] - first - (last - first) * part(i)).norm();
         let sag = REACH[places.len()] * (0..places.len()).map(off_chord).fold(0.0, f64::max);
         let mut edges = self.surface.edges_near([first, last], sag + self.chain.radius * (1.0 + MARGIN));
-        let place = k as f64;
-        let is_near = |point: &&PointMemory| (point.place - place - 0.5).abs() <= 0.5 + LARGEST_SHIFT;
+        let middle = k as f64 + 0.5;
+        let is_near = |point: &&PointMemory| self.chain.shift(point.place, middle) <= 0.5 + LARGEST_SHIFT;
         edges.extend(self.points.iter().filter(is_near).filter_map(|point| point.edge));
         edges.sort_unstable();
         edges.dedup();
@@ -328,8 +336,11 @@ impl SeenChain<'_> {
             let smooth = minima.found().iter().filter(|minimum| minimum.kind != MinimumKind::Kink);
             found.extend(smooth.filter(|minimum| is_beside(minimum.s)).map(|minimum| at(minimum.s, Place::Closest)));
             let falls = |k: usize, s: f64| self.slope(k, s, &edge).is_some_and(|slope| slope < 0.0);
-            let is_last = k + 1 == self.chain.elements();
-            if (k == 0 || falls(k - 1, 1.0)) && !falls(k, 0.0) && is_beside(0.0) {
+            let count = self.chain.elements();
+            let is_closed = self.chain.is_closed();
+            let is_last = k + 1 == count && !is_closed;
+            let is_first = k == 0 && !is_closed;
+            if (is_first || falls((k + count - 1) % count, 1.0)) && !falls(k, 0.0) && is_beside(0.0) {
                 found.push(at(0.0, Place::Fixed));
             }
             if is_last && falls(k, 1.0) && is_beside(1.0) {
@@ -359,9 +370,15 @@ impl SeenChain<'_> {
             // A body alone has no elements, and counts as one.
             let from = k.saturating_sub(1).checked_div(order).unwrap_or(0);
             let to = k.checked_div(order).map_or(0, |element| element.min(is_near.len() - 1));
-            let beside = from..=to;
+            let is_closed = self.chain.is_closed();
+            let across = (is_closed && k == 0).then_some(is_near.len() - 1);
+            let beside = (from..=to).chain(across);
             let is_candidate = beside.clone().any(|e| is_near[e]) && !beside.clone().any(|e| has_minimum[e]);
-            if !is_candidate || (order > 0 && !self.chain.has_caps && self.is_cap(k)) {
+            // The last node of a ring is the first one.
+            if !is_candidate || (is_closed && k == last) {
+                continue;
+            }
+            if order > 0 && !self.chain.has_caps && self.is_cap(k) {
                 continue;
             }
             let s = if order == 0 { 0.0 } else { (k - to * order) as f64 / order as f64 };
@@ -372,6 +389,9 @@ impl SeenChain<'_> {
     /// True if node `k` is an end of the chain that faces the surface.
     fn is_cap(&self, k: usize) -> bool {
         let last = self.places.len() - 1;
+        if self.chain.is_closed() {
+            return false;
+        }
         let outward = if k == 0 {
             self.places[0] - self.places[1]
         } else if k == last {

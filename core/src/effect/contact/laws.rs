@@ -1,5 +1,7 @@
 //! The laws of a contact, and bounds that surfaces and pairs of beams share.
 
+use crate::kernel::contact::{CarriedTraction, NormalLaw};
+
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
 
@@ -27,6 +29,19 @@ pub struct ContactLaws {
 }
 
 impl ContactLaws {
+    /// The memory of friction at an accepted point. A point that barely touches has none: the
+    /// direction of its traction is that of round-off.
+    pub(super) fn carried(&self, normal: &NormalLaw, force: f64, now: CarriedTraction) -> CarriedTraction {
+        let barely = TOUCHING * self.penetration * normal.stiffness();
+        if force > barely { now } else { CarriedTraction { normal: now.normal, ..CarriedTraction::default() } }
+    }
+
+    /// The coefficient of friction at a part of the length of a beam.
+    pub(super) fn friction_at(&self, fraction: f64) -> f64 {
+        let [start, end] = self.friction;
+        start + (end - start) * fraction
+    }
+
     /// True if it has friction.
     pub fn rubs(&self) -> bool {
         self.friction != [0.0; 2]

@@ -154,8 +154,7 @@ impl SurfaceContacts {
             });
         }
         at.contacts.chains = Arc::new(chains);
-        self.pairs().remember(at, accepts);
-        dissipated
+        dissipated + self.pairs().remember(at, accepts)
     }
 
     /// The length of beams with a force, or without one between points that have some, as where a
@@ -353,8 +352,7 @@ impl<'a> ChainNow<'a> {
                 (normal, stiffness.penalty)
             }
         };
-        let [start, end] = self.laws.friction;
-        let coefficient = start + (end - start) * self.chain.fraction(candidate);
+        let coefficient = self.laws.friction_at(self.chain.fraction(candidate));
         let friction = (coefficient > 0.0).then_some(FrictionLaw { coefficient, stiffness: self.laws.stick * first });
         let carried = partner.map_or(CarriedTraction::default(), |point| CarriedTraction {
             force: point.traction,
@@ -373,7 +371,8 @@ impl<'a> ChainNow<'a> {
         let slides = state.status() == Status::Slides;
         let rotation = &self.carrier.rotation.r;
         let carried = if accepts {
-            CarriedTraction { force: state.traction.force, normal: state.normal, slides }
+            let now = CarriedTraction { force: state.traction.force, normal: state.normal, slides };
+            self.laws.carried(&law.normal, state.normal_force.force, now)
         } else {
             law.carried
         };
@@ -653,7 +652,12 @@ impl Contacts for SurfaceContacts {
                 change = ContactChange::Touches;
             }
         });
-        if change == ContactChange::None { self.pairs().change(before, at) } else { change }
+        match self.pairs().change(before, at) {
+            ContactChange::None => change,
+            ContactChange::Slides => ContactChange::Slides,
+            ContactChange::Touches if change == ContactChange::None => ContactChange::Touches,
+            ContactChange::Touches => change,
+        }
     }
 
     fn penetrates(&self, at: &State) -> Option<Penetration> {
@@ -720,7 +724,15 @@ impl Contacts for SurfaceContacts {
                 }
             }
         }
-        self.pairs().passed(from, to)
+        let mut turned = None;
+        self.each_chain(to, Weights::NONE, &mut |_, chain| {
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                if point.state.traction.turned_over {
+                    turned = Some(chain.slot_of(point.candidate));
+                }
+            });
+        });
+        turned.or_else(|| self.pairs().passed(from, to))
     }
 
     fn energy(&self, at: &State) -> f64 {
@@ -739,7 +751,7 @@ impl Contacts for SurfaceContacts {
                     energy += point.traction.squared() / (2.0 * laws.stick * first);
                 }
             }
-            return energy;
+            return energy + self.pairs().stick_energy(at);
         }
         self.each_chain(at, Weights::NONE, &mut |_, chain| {
             chain.each_point(Weights::NONE, &mut |point, _| energy += point.energy());
@@ -758,7 +770,8 @@ impl Contacts for SurfaceContacts {
 
     fn force_along(&self, beam: usize, fraction: f64, at: &State) -> [f64; 2] {
         let [normal, friction] = resultant::force_along(&self.chains, beam, fraction, at);
-        [normal + self.pairs().force_along(beam, fraction, at), friction]
+        let of_pairs = self.pairs().force_along(beam, fraction, at);
+        [normal + of_pairs[0], friction + of_pairs[1]]
     }
 }
 

@@ -50,6 +50,17 @@ impl Strand {
         self.stiffness.len()
     }
 
+    /// True for a ring: the last node is the first one.
+    pub(super) fn is_closed(&self) -> bool {
+        self.order > 0 && self.nodes[0].node.u == self.nodes[self.nodes.len() - 1].node.u
+    }
+
+    /// The distance along the beam of two places, in elements; of a ring the shorter way round.
+    pub(super) fn shift(&self, a: f64, b: f64) -> f64 {
+        let direct = (a - b).abs();
+        if self.is_closed() { direct.min(self.elements() as f64 - direct) } else { direct }
+    }
+
     /// Nodes of element `k`.
     pub fn nodes_of(&self, k: usize) -> &[ChainNode] {
         &self.nodes[k * self.order..=(k + 1) * self.order]
@@ -63,6 +74,10 @@ impl Strand {
         }
         let last = self.nodes.len() - 1;
         let at = along * self.order as f64;
+        if self.is_closed() && (at == 0.0 || at == last as f64) {
+            let [first, before_last] = [1, last - 1].map(|node| self.nodes[node].fraction);
+            return 0.5 * self.length * (first + 1.0 - before_last);
+        }
         let (from, to) = if at.fract() == 0.0 {
             let node = at as usize;
             (node.saturating_sub(1), (node + 1).min(last))

@@ -92,6 +92,13 @@ impl NormalLaw {
         }
     }
 
+    /// K, force per length.
+    pub fn stiffness(&self) -> f64 {
+        match *self {
+            Self::Augmented { stiffness, .. } | Self::Penalty { stiffness, .. } => stiffness,
+        }
+    }
+
     /// The stored energy of a gap: zero for the augmented Lagrangian, whose force is a reaction.
     pub fn energy(&self, gap: f64) -> f64 {
         match *self {

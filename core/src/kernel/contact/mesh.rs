@@ -108,20 +108,20 @@ impl TriangleMesh {
     pub(super) fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
         let here = Vec3(y.0.map(T::largest));
         let closest = self.closest(here);
-        self.from_part(closest.part, closest.face, y, here)
+        self.to_part(closest.part, closest.face, y, here)
     }
 
     /// The distance from a part that has the closest point, which was found on `face`.
-    fn from_part<T: Real>(&self, part: Part, face: u32, y: Vec3<T>, here: Vec3) -> Result<Distance<T>, Undefined> {
+    fn to_part<T: Real>(&self, part: Part, face: u32, y: Vec3<T>, here: Vec3) -> Result<Distance<T>, Undefined> {
         match part {
-            Part::Face(face) => Ok(self.from_face(face, y)),
+            Part::Face(face) => Ok(self.to_face(face, y)),
             Part::Edge(number) => {
                 let edge = &self.parts.edges[number as usize];
                 let d = here - self.parts.place(edge.ends[0]);
                 let q = d - edge.along * edge.along.dot(d);
                 let normals = edge.faces.map(|face| self.parts.faces[face as usize].normal);
                 if let Some(above) = self.face_below(q, face, edge.faces) {
-                    return Ok(self.from_face(above, y));
+                    return Ok(self.to_face(above, y));
                 }
                 let start = Vec3::constant(self.parts.place(edge.ends[0]));
                 let outside = Distance { feature: Feature::Edge, ..cylinder(y - start, edge.along, 0.0)? };
@@ -132,7 +132,7 @@ impl TriangleMesh {
                 let edges = self.parts.edges_at(corner);
                 let faces = edges.iter().flat_map(|&edge| self.parts.edges[edge as usize].faces);
                 if let Some(above) = self.face_below(d, face, faces) {
-                    return Ok(self.from_face(above, y));
+                    return Ok(self.to_face(above, y));
                 }
                 let length = d.norm();
                 let is_beside = |edge: &&u32| {
@@ -140,7 +140,7 @@ impl TriangleMesh {
                     edge.bend != Bend::Flat && edge.along.dot(d).abs() <= BESIDE_EDGE * length
                 };
                 if let Some(&edge) = edges.iter().find(is_beside) {
-                    return self.from_part(Part::Edge(edge), face, y, here);
+                    return self.to_part(Part::Edge(edge), face, y, here);
                 }
                 let at = Vec3::constant(self.parts.place(corner));
                 let outside = Distance { feature: Feature::Corner, ..sphere(y - at, 0.0)? };
@@ -160,7 +160,7 @@ impl TriangleMesh {
         faces.into_iter().find(is_above)
     }
 
-    fn from_face<T: Real>(&self, face: u32, y: Vec3<T>) -> Distance<T> {
+    fn to_face<T: Real>(&self, face: u32, y: Vec3<T>) -> Distance<T> {
         let [a, _, _] = self.parts.corners(face);
         plane(y, a, self.parts.faces[face as usize].normal)
     }

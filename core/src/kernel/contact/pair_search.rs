@@ -112,14 +112,14 @@ fn foot(point: Vec3, ends: [Vec3; 2]) -> f64 {
 /// `motion` has the displacements of the ends. The mean motion is subtracted; then no point of A
 /// comes nearer to a point of B by more than l = max|A| + max|B| in the whole motion, so that
 /// advances by 0.9 (distance - kept)/l are safe. `sag` bounds how far curved elements are from their
-/// chords, both together.
-pub fn safe_part(segments: &Segments, motion: &Segments, sag: f64) -> f64 {
+/// chords, both together. Of distances above `enough` a tenth of that is kept.
+pub fn safe_part(segments: &Segments, motion: &Segments, sag: f64, enough: f64) -> f64 {
     let mean = (motion.a[0] + motion.a[1] + motion.b[0] + motion.b[1]) * 0.25;
     let size = |ends: [Vec3; 2]| (ends[0] - mean).norm().max((ends[1] - mean).norm());
     let fastest = size(motion.a) + size(motion.b);
     let distance = |part: f64| (segments.moved(motion, part).closest().distance - sag).max(0.0);
     let start = distance(0.0);
-    let kept = KEPT_DISTANCE * start;
+    let kept = KEPT_DISTANCE * start.min(enough);
     if start - kept >= fastest {
         return 1.0;
     }
@@ -304,7 +304,7 @@ mod tests {
         for _ in 0..3000 {
             let segments = random_segments(&mut random, 1.0);
             let motion = random_segments(&mut random, 2.0);
-            let part = safe_part(&segments, &motion, 0.0);
+            let part = safe_part(&segments, &motion, 0.0, f64::INFINITY);
             assert!(part > 0.0 && part <= 1.0);
             whole += usize::from(part == 1.0);
             let start = segments.closest().distance;
@@ -322,13 +322,13 @@ mod tests {
         // Head on: all but a tenth of the distance.
         let segments = Segments { a: [Vec3::ZERO, Vec3::UNIT[0]], b: [Vec3([0.5, -1.0, 1.0]), Vec3([0.5, 1.0, 1.0])] };
         let up = Segments { a: [Vec3([0.0, 0.0, 2.0]); 2], b: [Vec3::ZERO; 2] };
-        let part = safe_part(&segments, &up, 0.0);
+        let part = safe_part(&segments, &up, 0.0, f64::INFINITY);
         assert!((part - 0.45).abs() < 1e-9, "{part}");
         // A common motion is no approach.
         let far = Segments { a: [Vec3([9.0, 0.0, 2.0]); 2], b: [Vec3([9.0, 0.0, 2.0]); 2] };
-        assert_eq!(safe_part(&segments, &far, 0.0), 1.0);
+        assert_eq!(safe_part(&segments, &far, 0.0, f64::INFINITY), 1.0);
         // With a sag of all the distance nothing is proven.
-        assert_eq!(safe_part(&segments, &up, 1.0), 0.0);
+        assert_eq!(safe_part(&segments, &up, 1.0, f64::INFINITY), 0.0);
     }
 
     fn compare<const NA: usize, const NB: usize>(random: &mut Random) -> [usize; 2] {

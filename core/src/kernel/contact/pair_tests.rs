@@ -253,7 +253,7 @@ fn examine<const NA: usize, const NB: usize>(
     match scene.now(Weights::NONE).1.status() {
         Status::Sticks => errors.stick += 1,
         Status::Slides => errors.slip += 1,
-        _ => {}
+        Status::Open | Status::Frictionless => {}
     }
     let weights = if damped { WEIGHTS } else { Weights::STIFFNESS };
     let (system, _) = scene.now(weights);

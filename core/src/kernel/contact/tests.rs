@@ -177,7 +177,7 @@ impl<const N: usize> Scene<N> {
         let unknowns = from_fn(|i| Unknowns::along(&self.bodies[i], 6 * i, directions, weights));
         let carrier = match self.carried_by {
             CarriedBy::Node => Unknowns::along(&self.carrier, 6 * N, directions, weights),
-            _ => Unknowns::constants(&self.carrier),
+            CarriedBy::Ground | CarriedBy::Motion => Unknowns::constants(&self.carrier),
         };
         let s = match self.law.place {
             Place::Fixed => D::constant(self.s),
@@ -348,7 +348,7 @@ fn examine<const N: usize>(random: &mut Random, surface: &Surface, kind: Kind, w
         match scene.now(Weights::NONE).1.status() {
             Status::Sticks => errors.stick += 1,
             Status::Slides => errors.slip += 1,
-            _ => {}
+            Status::Open | Status::Frictionless => {}
         }
         let weights = if kind.damped { WEIGHTS } else { Weights::STIFFNESS };
         let directions = random.directions(3 * scene.blocks());

@@ -223,7 +223,7 @@ impl Tube {
             && ((k == 0 && cones[k].is_before(here)) || (k + 1 == cones.len() && cones[k].is_after(here)));
         match self.ends {
             TubeEnds::Open if beyond => Err(Undefined::BeyondEnd),
-            _ => Ok(distance),
+            TubeEnds::Open | TubeEnds::Round => Ok(distance),
         }
     }
 

@@ -163,10 +163,10 @@ impl Buckling<'_, '_> {
         let count = loads.len() as f64;
         let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
         let mut found = self.follow(loads[number], before, &done)?;
-        self.stage.go_back_to(start);
+        self.stage.go_back_to(start)?;
         if found.critical.kind == CriticalKind::Estimate {
             found.critical.load = self.extrapolate(loads[number], before)?.unwrap_or(found.critical.load);
-            self.stage.go_back_to(start);
+            self.stage.go_back_to(start)?;
         }
         Ok(found)
     }
@@ -201,7 +201,7 @@ impl Buckling<'_, '_> {
                 break;
             }
             let target = search.target();
-            self.stage.go_back_to(&search.here);
+            self.stage.go_back_to(&search.here)?;
             self.stage.tell_progress(done(search.come()))?;
             let walked = continue_path(self.stage, target)?;
             if walked != Walked::There || has_leapt(self.stage, &search.here)? {
@@ -212,7 +212,7 @@ impl Buckling<'_, '_> {
             let count = negative_pivots(self.stage);
             let Some(passed) = none.zip(count).map(|(none, count)| count.saturating_sub(none)) else {
                 // Without a count of pivots the tangent itself must do.
-                self.stage.go_back_to(&search.here);
+                self.stage.go_back_to(&search.here)?;
                 return self.follow_nearest(search.estimate, before, done);
             };
             if passed > before {
@@ -238,7 +238,7 @@ impl Buckling<'_, '_> {
     /// True if load control follows the path past a load from next to it, with so many negative
     /// pivots. The state is then that point.
     fn goes_on(&mut self, search: &CriticalSearch, load: f64, negative: Option<usize>) -> Result<bool, Failure> {
-        self.stage.go_back_to(&search.here);
+        self.stage.go_back_to(&search.here)?;
         let walked = continue_path(self.stage, load + search.way * BEHIND * load.abs())?;
         Ok(walked == Walked::There
             && !has_leapt(self.stage, &search.here)?

@@ -59,8 +59,7 @@ impl StageRun<'_> {
             }
             if may_soften && self.newton.was_shortened {
                 if stiffenings == MOST_STIFFENINGS {
-                    self.set_first_factor(first_factor.min(STIFFEST_START));
-                    self.good.contacts.goes_on = true;
+                    self.give_up(first_factor);
                     return Err(failure);
                 }
                 stiffenings += 1;
@@ -75,13 +74,20 @@ impl StageRun<'_> {
             }
             let touched = self.good.contacts.touches() || self.state_touches();
             if !(may_soften && touched && self.good.contacts.first_factor > SOFTEST * GROWTH.sqrt()) {
-                self.good.contacts.goes_on = true;
+                self.give_up(first_factor);
                 return Err(failure);
             }
             self.set_first_factor(self.good.contacts.first_factor / GROWTH);
             self.counters.contacts.softenings += 1;
             self.state.copy_all_but_rates(self.good);
         }
+    }
+
+    /// Lets the next level, which is a smaller one, begin as the present one did: with this stiffness
+    /// and points that go on sliding.
+    fn give_up(&mut self, first_factor: f64) {
+        self.set_first_factor(first_factor);
+        self.good.contacts.goes_on = true;
     }
 
     /// Goes back to the last good state with a stiffer contact: a soft one cannot keep beams apart,

@@ -57,8 +57,9 @@ impl Neighbours {
     fn new(adjacency: &Adjacency, order: &[u32], most: usize) -> Option<Self> {
         let n = order.len();
         let row_of = inverse(order);
-        // Rows whose first later neighbour is the index
-        let mut children: Vec<Vec<u32>> = vec![Vec::new(); n];
+        // The last row so far whose first later neighbour is the index, and the one before each
+        let mut last_child = vec![NO_ROW; n];
+        let mut child_before = vec![NO_ROW; n];
         let mut seen = vec![u32::MAX; n];
         let mut starts = Vec::with_capacity(n + 1);
         let mut later = Vec::with_capacity(adjacency.pairs());
@@ -75,14 +76,17 @@ impl Neighbours {
             for node_block in adjacency.of(order[row] as usize) {
                 visit(row_of[node_block as usize], &mut later);
             }
-            for child in std::mem::take(&mut children[row]) {
+            let mut child = last_child[row];
+            while child != NO_ROW {
                 for k in starts[child as usize] as usize..starts[child as usize + 1] as usize {
                     visit(later[k], &mut later);
                 }
+                child = child_before[child as usize];
             }
             later[start..].sort_unstable();
             if let Some(&parent) = later.get(start) {
-                children[parent as usize].push(row as u32);
+                child_before[row] = last_child[parent as usize];
+                last_child[parent as usize] = row as u32;
             }
             if later.len() > most || interrupt::is_requested() {
                 return None;

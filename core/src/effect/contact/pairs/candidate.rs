@@ -8,7 +8,7 @@ use crate::effect::contact::chain::CAP_COSINE;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::pair_search::{bilateral, closest_to_point};
 use crate::kernel::contact::{MinimumKind, ShapeAt};
-use crate::system::PairPointKind;
+use crate::system::{ContactRegime, PairPointKind};
 use crate::tensor::Vec3;
 
 /// Closest points nearer to a node than this part of the element are at the node.
@@ -19,9 +19,10 @@ const AT_NODE: f64 = 1e-6;
 pub(super) struct Side<const N: usize> {
     /// Places of its nodes
     pub nodes: [Vec3; N],
-    /// The derivative of the place at the start of the next element of the beam
+    /// The derivative of the place at the start of the next element of the beam; of the last element
+    /// of a ring, the first one
     pub next: Option<Vec3>,
-    /// True for the first element of the beam
+    /// True for the first element of a beam that is no ring
     pub is_first: bool,
     /// True if ends of the beam are half spheres, false if they do not touch
     pub has_caps: bool,
@@ -109,18 +110,43 @@ fn is_inside(s: f64) -> bool {
     s > AT_NODE && s < 1.0 - AT_NODE
 }
 
-/// Adds the candidates of two elements; `blend` is the part of the force that closest points carry.
+/// Weights of the points of a pair by their kind; points without a weight are left out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PointWeights {
+    closest: f64,
+    node: f64,
+}
+
+impl PointWeights {
+    /// Both kinds.
+    pub const ALL: Self = Self { closest: 1.0, node: 0.5 };
+
+    /// Weights where closest points carry the part `blend` of the force. Penalties share the force of
+    /// the same gap. Multipliers close the gap of each point whatever its weight, which only makes
+    /// its stiffness smaller: a point of small weight would take many augmentations.
+    pub fn new(blend: f64, regime: ContactRegime) -> Self {
+        match regime {
+            ContactRegime::Penalty => Self { closest: blend, node: 0.5 * (1.0 - blend) },
+            ContactRegime::Augmented => Self {
+                closest: if blend > 0.0 { Self::ALL.closest } else { 0.0 },
+                node: if blend < 1.0 { Self::ALL.node } else { 0.0 },
+            },
+        }
+    }
+}
+
+/// Adds the candidates of two elements.
 pub(super) fn candidates<const NA: usize, const NB: usize>(
     a: &Side<NA>,
     b: &Side<NB>,
-    blend: f64,
+    weights: PointWeights,
     out: &mut Vec<PairCandidate>,
 ) {
-    if blend > 0.0 {
-        add_closest(a, b, blend, out);
+    if weights.closest > 0.0 {
+        add_closest(a, b, weights.closest, out);
     }
-    if blend < 1.0 {
-        let weight = 0.5 * (1.0 - blend);
+    if weights.node > 0.0 {
+        let weight = weights.node;
         add_nodes(a, b, &mut |[s, e], moves| {
             out.push(PairCandidate { at: [s, e], free: [false, moves], kind: PairPointKind::NodeOfFirst, weight });
         });

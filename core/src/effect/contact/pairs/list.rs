@@ -39,6 +39,14 @@ const SIDE_BY_SIDE: f64 = 0.174_532_925_199_432_95;
 /// The smallest angle of elements that cross, in radians: 20 degrees.
 const CROSSING: f64 = 2.0 * SIDE_BY_SIDE;
 
+/// The largest offset of neighbouring nodes across the other beam, over the sum of radii, at which
+/// nodes carry all of the force. The gap between two nodes in contact is then less than theirs by
+/// 3e-4 of that sum.
+const SMALLEST_OFFSET: f64 = 0.05;
+
+/// The offset from which on closest points carry all of the force.
+const LARGEST_OFFSET: f64 = 0.15;
+
 impl BeamPairs {
     /// Makes the first list.
     pub(in crate::effect::contact) fn list(&self, at: &State) -> PairsMemory {
@@ -51,6 +59,7 @@ impl BeamPairs {
             places: Arc::new(places),
             margin,
             points: Arc::default(),
+            nodes: Arc::default(),
         }
     }
 
@@ -180,11 +189,18 @@ impl BeamPairs {
     fn may_meet(&self, pair: &ListedPair, before: &[Vec3], after: &[Vec3]) -> bool {
         let [a, b] = self.both(pair.meeting as usize);
         let sag = self.sags(pair, before).max(self.sags(pair, after)) + a.radius + b.radius;
-        self.least_part(pair, before, after, sag) < 1.0
+        self.least_part(pair, before, after, [sag, f64::INFINITY]) < 1.0
     }
 
-    /// The part of a motion on which the chords of a pair stay apart by more than `sag`.
-    pub(super) fn least_part(&self, pair: &ListedPair, before: &[Vec3], after: &[Vec3], sag: f64) -> f64 {
+    /// The part of a motion on which the chords of a pair stay apart by more than a sag; see
+    /// [`safe_part`] for it and the distance that is enough.
+    pub(super) fn least_part(
+        &self,
+        pair: &ListedPair,
+        before: &[Vec3],
+        after: &[Vec3],
+        [sag, enough]: [f64; 2],
+    ) -> f64 {
         let mut part = 1.0f64;
         self.each_chords(pair, before, &mut |[i, j], segments| {
             let [of_a, of_b] = self.elements_of(pair).map(|of| self.of_element(of, after));
@@ -192,7 +208,7 @@ impl BeamPairs {
                 a: [of_a[i] - segments.a[0], of_a[i + 1] - segments.a[1]],
                 b: [of_b[j] - segments.b[0], of_b[j + 1] - segments.b[1]],
             };
-            part = part.min(safe_part(segments, &motion, sag));
+            part = part.min(safe_part(segments, &motion, sag, enough));
         });
         part
     }
@@ -221,20 +237,36 @@ impl BeamPairs {
     }
 
     /// The part of the force of each pair that closest points carry, by the angle between the
-    /// chords of its elements: all of it where they cross, none where they are side by side.
-    fn blend(&self, list: &[ListedPair], places: &[Vec3]) -> Vec<f64> {
+    /// chords of its elements and by how far that takes neighbouring nodes across the other beam: all
+    /// of it where they cross, none where they are side by side.
+    pub(super) fn blend(&self, list: &[ListedPair], places: &[Vec3]) -> Vec<f64> {
         let of_pair = |pair: &ListedPair| {
             let chord = |of: ElementOf| {
                 let nodes = self.of_element(of, places);
-                (nodes[nodes.len() - 1] - nodes[0]).normalized().unwrap_or(Vec3::ZERO)
+                nodes[nodes.len() - 1] - nodes[0]
             };
             let [a, b] = self.elements_of(pair).map(chord);
-            let angle = libm::atan2(a.cross(b).norm(), a.dot(b).abs());
-            let part = ((angle - SIDE_BY_SIDE) / (CROSSING - SIDE_BY_SIDE)).clamp(0.0, 1.0);
-            part * part * (3.0 - 2.0 * part)
+            let strands = self.both(pair.meeting as usize);
+            let spacing = (a.norm() / strands[0].order as f64).min(b.norm() / strands[1].order as f64);
+            let [a, b] = [a, b].map(|chord| chord.normalized().unwrap_or(Vec3::ZERO));
+            let sine = a.cross(b).norm();
+            let angle = libm::atan2(sine, a.dot(b).abs());
+            let offset = spacing * sine / (strands[0].radius + strands[1].radius);
+            let by_angle = smooth_part(angle, [SIDE_BY_SIDE, CROSSING]);
+            // The closest points of curved elements side by side may part into two.
+            if strands.iter().any(|strand| strand.order > 1) {
+                return by_angle;
+            }
+            by_angle.max(smooth_part(offset, [SMALLEST_OFFSET, LARGEST_OFFSET]))
         };
         list.iter().map(of_pair).collect()
     }
+}
+
+/// 0 below the first bound, 1 above the second one, between them a smooth step.
+fn smooth_part(value: f64, [low, high]: [f64; 2]) -> f64 {
+    let part = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    part * part * (3.0 - 2.0 * part)
 }
 
 /// The largest distance between places of the same node.

@@ -5,6 +5,7 @@
 //! carry it at the nodes of both ([`candidate`]).
 
 mod candidate;
+mod friction;
 mod list;
 mod point;
 mod role;
@@ -14,7 +15,7 @@ pub(super) use role::PairRole;
 use super::strand::{ChainNode, Strand};
 use crate::system::{ListedPair, Slot, State};
 use crate::tensor::Vec3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 /// Two strands that may touch, or one that may touch itself.
@@ -32,11 +33,13 @@ impl Meeting {
     }
 }
 
-/// A node that two strands of a meeting share.
+/// A node that two strands of a meeting share, or two nodes that joints connect.
 #[derive(Clone, Copy, Debug)]
 struct Join {
     /// The lengths of the strands before it
     arcs: [f64; 2],
+    /// The distance of both nodes
+    apart: f64,
 }
 
 /// Beams that may touch each other.
@@ -64,8 +67,9 @@ struct ElementOf {
 }
 
 impl BeamPairs {
-    /// Meetings of beams: each strand is a beam with its name.
-    pub fn new(beams: Vec<(String, Strand)>, meetings: Vec<Meeting>) -> Self {
+    /// Meetings of beams: each strand is a beam with its name. `connected` has the slots of
+    /// displacement of nodes that joints connect.
+    pub fn new(beams: Vec<(String, Strand)>, meetings: Vec<Meeting>, connected: &[[Slot; 2]]) -> Self {
         let (names, strands): (Vec<String>, Vec<Strand>) = beams.into_iter().unzip();
         let sums = |count: fn(&Strand) -> usize| {
             let mut sum = 0;
@@ -76,11 +80,12 @@ impl BeamPairs {
             }));
             sums
         };
+        let groups = JointGroups::new(connected);
         Self {
             first_nodes: sums(|strand| strand.nodes.len()),
             first_elements: sums(Strand::elements),
             by_strands: meetings.iter().enumerate().map(|(k, meeting)| (meeting.strands, k)).collect(),
-            joins: meetings.iter().map(|meeting| joins(meeting, &strands)).collect(),
+            joins: meetings.iter().map(|meeting| joins(meeting, &strands, &groups)).collect(),
             strands,
             names,
             meetings,
@@ -95,6 +100,48 @@ impl BeamPairs {
     /// The number of meetings.
     pub fn len(&self) -> usize {
         self.meetings.len()
+    }
+
+    /// The number of pairs of elements that can meet: those that are no neighbours.
+    pub fn element_pairs(&self) -> usize {
+        (0..self.len()).map(|meeting| self.all_pairs(meeting) - self.neighbours(meeting)).sum()
+    }
+
+    fn all_pairs(&self, meeting: usize) -> usize {
+        let [a, b] = self.both(meeting).map(Strand::elements);
+        if self.meetings[meeting].is_own() { a * (a - 1) / 2 } else { a * b }
+    }
+
+    /// The number of pairs of elements of a meeting that cannot touch, without the element itself.
+    fn neighbours(&self, meeting: usize) -> usize {
+        let strands = self.both(meeting);
+        let is_own = self.meetings[meeting].is_own();
+        let arcs = strands.map(|strand| (0..strand.elements()).map(|k| arcs_of(strand, k)).collect::<Vec<_>>());
+        let longest = arcs.iter().flatten().map(|[from, to]| to - from).fold(0.0, f64::max);
+        let least = 0.5 * PI * (strands[0].radius + strands[1].radius) + longest;
+        let mut found = BTreeSet::new();
+        let mut note = |a: usize, b: usize| {
+            let elements = if is_own { [a.min(b), a.max(b)] } else { [a, b] };
+            if !(is_own && a == b) && self.are_neighbours(meeting, elements) {
+                found.insert(elements);
+            }
+        };
+        // Elements by their ends: those that reach beyond a place, up to those that begin before another.
+        let near = |side: usize, from: f64, to: f64| {
+            let first = arcs[side].partition_point(|arc| arc[1] < from);
+            let end = arcs[side].partition_point(|arc| arc[0] <= to);
+            first..end
+        };
+        if is_own {
+            for (a, arc) in arcs[0].iter().enumerate() {
+                near(0, arc[0], arc[1] + least).for_each(|b| note(a, b));
+            }
+        }
+        for join in &self.joins[meeting] {
+            let [on_a, on_b] = [0, 1].map(|side| near(side, join.arcs[side] - least, join.arcs[side] + least));
+            on_a.for_each(|a| on_b.clone().for_each(|b| note(a, b)));
+        }
+        found.len()
     }
 
     /// The names of both beams of each meeting.
@@ -161,7 +208,10 @@ impl BeamPairs {
             return true;
         }
         let beside = |[from, to]: [f64; 2], at: f64| (from - at).max(at - to).max(0.0);
-        self.joins[meeting].iter().any(|join| beside(arcs[0], join.arcs[0]) + beside(arcs[1], join.arcs[1]) < least)
+        self.joins[meeting].iter().any(|join| {
+            let way = beside(arcs[0], join.arcs[0]) + join.apart + beside(arcs[1], join.arcs[1]);
+            way < least
+        })
     }
 }
 
@@ -171,15 +221,45 @@ fn arcs_of(strand: &Strand, element: usize) -> [f64; 2] {
     [nodes[0].fraction, nodes[nodes.len() - 1].fraction].map(|fraction| fraction * strand.length)
 }
 
-/// The nodes that the strands of a meeting share.
-fn joins(meeting: &Meeting, strands: &[Strand]) -> Vec<Join> {
+/// Nodes that joints connect, by the slots of their displacement.
+struct JointGroups {
+    /// Another slot of the group; slots that are not there stand for their group
+    towards: BTreeMap<Slot, Slot>,
+}
+
+impl JointGroups {
+    fn new(connected: &[[Slot; 2]]) -> Self {
+        let mut groups = Self { towards: BTreeMap::new() };
+        for pair in connected {
+            let [a, b] = pair.map(|slot| groups.of(slot));
+            if a != b {
+                groups.towards.insert(a, b);
+            }
+        }
+        groups
+    }
+
+    /// The slot that stands for the group of a node.
+    fn of(&self, slot: Slot) -> Slot {
+        let mut slot = slot;
+        while let Some(&next) = self.towards.get(&slot) {
+            slot = next;
+        }
+        slot
+    }
+}
+
+/// The nodes that the strands of a meeting share, and those that joints connect.
+fn joins(meeting: &Meeting, strands: &[Strand], groups: &JointGroups) -> Vec<Join> {
     let [a, b] = meeting.strands.map(|strand| &strands[strand]);
     let mut known: BTreeMap<Slot, Vec<usize>> = BTreeMap::new();
-    a.nodes.iter().enumerate().for_each(|(k, node)| known.entry(node.node.u).or_default().push(k));
+    a.nodes.iter().enumerate().for_each(|(k, node)| known.entry(groups.of(node.node.u)).or_default().push(k));
     let mut joins = Vec::new();
     for (j, node) in b.nodes.iter().enumerate() {
-        for &k in known.get(&node.node.u).into_iter().flatten().filter(|&&k| !(meeting.is_own() && k == j)) {
-            joins.push(Join { arcs: [a.nodes[k].fraction * a.length, node.fraction * b.length] });
+        let group = groups.of(node.node.u);
+        for &k in known.get(&group).into_iter().flatten().filter(|&&k| !(meeting.is_own() && k == j)) {
+            let arcs = [a.nodes[k].fraction * a.length, node.fraction * b.length];
+            joins.push(Join { arcs, apart: (a.nodes[k].place - node.place).norm() });
         }
     }
     joins

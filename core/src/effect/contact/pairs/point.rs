@@ -1,18 +1,19 @@
 //! Contact points of listed pairs in a state, with their forces.
 
-use super::candidate::{PairCandidate, Side, candidates};
+use super::candidate::{PairCandidate, PointWeights, Side, candidates};
 use super::{BeamPairs, ElementOf};
 use crate::effect::contact::chain::LARGEST_SHIFT;
 use crate::effect::contact::laws::{ContactLaws, TOUCHING};
 use crate::effect::contact::strand::ContactStiffness;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::{
-    CarriedTraction, ContactNode, NodeBefore, NormalLaw, PairLaw, PairSide, PointState, ShapeAt, add_pair,
+    CarriedTraction, ContactNode, NodeBefore, NormalLaw, PairLaw, PairSide, PointState, ShapeAt, Status, add_pair,
 };
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
 use crate::system::{ContactRegime, ListedPair, PairPointKind, PairPointMemory, PointMemory, State};
 use crate::tensor::{Mat3, Vec3};
+use std::borrow::Cow;
 
 /// Closest points nearer to each other than this part of an element, on both beams, are one contact.
 const SAME_PLACE: f64 = 0.9;
@@ -26,17 +27,40 @@ pub(super) struct PairPoint<'a> {
     /// Number of the point that it was, and its memory
     pub partner: Option<(usize, &'a PairPointMemory)>,
     pub law: PairLaw,
+    /// Normal and traction in the axes of the carrier
     pub state: PointState,
+    /// The rotation of the carrier
+    pub carrier: Mat3,
     /// The place on the centre line of the first beam
     pub place: Vec3,
     /// The number of nodes to both sides, and their shape functions
     pub shapes: [[f64; 4]; 2],
 }
 
+impl PairPoint<'_> {
+    /// The normal, from the second beam to the first (global axes).
+    pub fn normal(&self) -> Vec3 {
+        self.carrier * self.state.normal
+    }
+
+    /// The friction on the first beam without the weight (global axes).
+    pub fn traction(&self) -> Vec3 {
+        self.carrier * self.state.traction.force
+    }
+}
+
 /// A candidate with the number of its pair.
 struct Found {
     number: usize,
     candidate: PairCandidate,
+}
+
+/// A candidate with its pair, and the point in memory that it was.
+struct Part<'a> {
+    number: usize,
+    pair: ListedPair,
+    candidate: PairCandidate,
+    partner: Option<(usize, &'a PairPointMemory)>,
 }
 
 /// A look at listed pairs in a state.
@@ -47,6 +71,8 @@ pub(super) struct PairsNow<'a> {
     /// The list, which is that of the state but in an assembly of another one
     pub list: &'a [ListedPair],
     places: Vec<Vec3>,
+    /// The part of the force of each pair of the list that closest points carry
+    blend: Cow<'a, [f64]>,
 }
 
 /// Calls a function of two numbers of nodes, for elements of given orders.
@@ -69,7 +95,10 @@ macro_rules! of_orders {
 impl<'a> PairsNow<'a> {
     pub fn new(pairs: &'a BeamPairs, laws: &'a [ContactLaws], at: &'a State, list: &'a [ListedPair]) -> Self {
         let places = if list.is_empty() { Vec::new() } else { pairs.places(at) };
-        Self { pairs, laws, at, list, places }
+        let known = &at.contacts.pairs;
+        let is_known = *list == **known.list && known.blend.len() == list.len();
+        let blend = if is_known { Cow::Borrowed(&known.blend[..]) } else { Cow::Owned(pairs.blend(list, &places)) };
+        Self { pairs, laws, at, list, places, blend }
     }
 
     /// Visits the points of all pairs that act, with their systems.
@@ -94,12 +123,12 @@ impl<'a> PairsNow<'a> {
         visit: &mut dyn FnMut(&PairPoint<'a>, &ElementSystem),
     ) {
         let memory = self.memory_of_meeting(group[0].meeting);
-        let reach = self.reach(group[0].meeting as usize, memory.1, laws);
+        let reach = self.reach(memory.1, laws);
         let mut found = Vec::new();
         for (number, pair) in (first..).zip(group) {
             if self.pairs.chord_gap(pair, &self.places) <= reach {
-                let blend = self.at.contacts.pairs.blend.get(number).copied().unwrap_or(1.0);
-                let candidates = self.candidates(pair, blend);
+                let weights = PointWeights::new(self.blend[number], self.at.contacts.regime);
+                let candidates = self.candidates(pair, weights);
                 found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
             }
         }
@@ -113,8 +142,8 @@ impl<'a> PairsNow<'a> {
             let partner = partner.map(|own| (memory.0 + own, &memory.1[own]));
             let law = self.law(&self.list[*number], candidate, partner.map(|(_, memory)| memory), laws);
             system.clear_for(weights);
-            let pair = self.list[*number];
-            let point = of_orders!(orders, self.point(*number, &pair, candidate, partner, law, weights, &mut system));
+            let part = Part { number: *number, pair: self.list[*number], candidate: *candidate, partner };
+            let point = of_orders!(orders, self.point(&part, law, weights, &mut system));
             if let Some(point) = point {
                 visit(&point, &system);
             }
@@ -130,12 +159,12 @@ impl<'a> PairsNow<'a> {
     }
 
     /// The largest gap at which points of a meeting may have a force, or touch.
-    fn reach(&self, meeting: usize, memory: &[PairPointMemory], laws: &ContactLaws) -> f64 {
+    fn reach(&self, memory: &[PairPointMemory], laws: &ContactLaws) -> f64 {
         let touching = TOUCHING * laws.penetration;
         let of_point = |point: &PairPointMemory| match self.at.contacts.regime {
             ContactRegime::Penalty => point.point.offset,
             ContactRegime::Augmented => {
-                let stiffness = self.stiffness_at(meeting, point).augmented * self.at.contacts.factor;
+                let stiffness = self.stiffness_at(point).augmented * self.at.contacts.factor;
                 point.point.multiplier / stiffness
             }
         };
@@ -143,30 +172,39 @@ impl<'a> PairsNow<'a> {
     }
 
     /// The stiffness of the contact at a point in memory.
-    pub fn stiffness_at(&self, meeting: usize, point: &PairPointMemory) -> ContactStiffness {
-        let strands = self.pairs.both(meeting);
+    pub fn stiffness_at(&self, point: &PairPointMemory) -> ContactStiffness {
+        self.stiffness(&self.pair_of(point))
+    }
+
+    /// The elements of a point in memory.
+    pub fn pair_of(&self, point: &PairPointMemory) -> ListedPair {
+        let strands = self.pairs.both(point.meeting as usize);
         let place = [point.point.place, point.on_second];
         let element = |side: usize| (place[side] as usize).min(strands[side].elements() - 1) as u32;
-        self.stiffness(&ListedPair { meeting: meeting as u32, elements: [element(0), element(1)] })
+        ListedPair { meeting: point.meeting, elements: [element(0), element(1)] }
     }
 
     /// The stiffness of the contact of two elements: that of both in series.
-    fn stiffness(&self, pair: &ListedPair) -> ContactStiffness {
+    pub fn stiffness(&self, pair: &ListedPair) -> ContactStiffness {
         let strands = self.pairs.both(pair.meeting as usize);
         let [a, b] = [0, 1].map(|side| strands[side].stiffness[pair.elements[side] as usize]);
         let in_series = |a: f64, b: f64| a * b / (a + b);
         ContactStiffness { augmented: in_series(a.augmented, b.augmented), penalty: in_series(a.penalty, b.penalty) }
     }
 
-    fn candidates(&self, pair: &ListedPair, blend: f64) -> Vec<PairCandidate> {
+    fn candidates(&self, pair: &ListedPair, weights: PointWeights) -> Vec<PairCandidate> {
         let orders = self.pairs.both(pair.meeting as usize).map(|strand| strand.order);
-        of_orders!(orders, self.candidates_of(pair, blend))
+        of_orders!(orders, self.candidates_of(pair, weights))
     }
 
-    fn candidates_of<const NA: usize, const NB: usize>(&self, pair: &ListedPair, blend: f64) -> Vec<PairCandidate> {
+    fn candidates_of<const NA: usize, const NB: usize>(
+        &self,
+        pair: &ListedPair,
+        weights: PointWeights,
+    ) -> Vec<PairCandidate> {
         let [a, b] = self.pairs.elements_of(pair);
         let mut out = Vec::new();
-        candidates(&self.side::<NA>(a), &self.side::<NB>(b), blend, &mut out);
+        candidates(&self.side::<NA>(a), &self.side::<NB>(b), weights, &mut out);
         out
     }
 
@@ -177,11 +215,12 @@ impl<'a> PairsNow<'a> {
             std::array::from_fn(|i| places[i])
         };
         let slope_at_start = |nodes: [Vec3; N]| weighted_sum(&ShapeAt::<N>::new(0.0).slopes, |i| nodes[i]);
-        let next = of.element + 1;
+        let is_closed = strand.is_closed();
+        let next = if is_closed { (of.element + 1) % strand.elements() } else { of.element + 1 };
         Side {
             nodes: nodes(of.element),
             next: (next < strand.elements()).then(|| slope_at_start(nodes(next))),
-            is_first: of.element == 0,
+            is_first: of.element == 0 && !is_closed,
             has_caps: strand.has_caps,
         }
     }
@@ -195,7 +234,7 @@ impl<'a> PairsNow<'a> {
         }
         let orders = strands.map(|strand| strand.order);
         let distance = |candidate: &PairCandidate| of_orders!(orders, self.distance(pair, candidate.at));
-        let distances = self.candidates(pair, 0.5).iter().map(distance).fold(f64::INFINITY, f64::min);
+        let distances = self.candidates(pair, PointWeights::ALL).iter().map(distance).fold(f64::INFINITY, f64::min);
         distances - strands[0].radius - strands[1].radius
     }
 
@@ -216,13 +255,15 @@ impl<'a> PairsNow<'a> {
             let orders = self.pairs.both(pair.meeting as usize).map(|strand| strand.order);
             of_orders!(orders, self.distance(pair, found.candidate.at))
         };
+        let Some(first) = found.first() else { return };
+        let strands = self.pairs.both(self.list[first.number].meeting as usize);
         let closest = |found: &&Found| found.candidate.kind == PairPointKind::Closest;
         let all: Vec<([f64; 2], f64)> =
             found.iter().filter(closest).map(|found| (along(found), distance(found))).collect();
         let is_beaten = |own: usize| {
             let (place, gap) = all[own];
             all.iter().enumerate().any(|(other, (at, less))| {
-                let is_near = place.iter().zip(at).all(|(a, b)| (a - b).abs() < SAME_PLACE);
+                let is_near = (0..2).all(|side| strands[side].shift(place[side], at[side]) < SAME_PLACE);
                 is_near && (*less < gap || (*less == gap && other < own))
             })
         };
@@ -238,7 +279,7 @@ impl<'a> PairsNow<'a> {
     pub fn is_among(&self, point: &PairPoint, memory: &[PairPointMemory]) -> bool {
         let first = memory.partition_point(|known| known.meeting < point.pair.meeting);
         let end = memory.partition_point(|known| known.meeting <= point.pair.meeting);
-        !links(&point.pair, &point.candidate, &memory[first..end]).is_empty()
+        !self.links(&point.pair, &point.candidate, &memory[first..end]).is_empty()
     }
 
     /// The number of the last point in memory of each candidate: the nearest ones first, each once.
@@ -246,7 +287,7 @@ impl<'a> PairsNow<'a> {
         let mut partner = vec![None; found.len()];
         let mut all: Vec<(f64, usize, usize)> = Vec::new();
         for (k, Found { number, candidate }) in found.iter().enumerate() {
-            let own = links(&self.list[*number], candidate, memory);
+            let own = self.links(&self.list[*number], candidate, memory);
             all.extend(own.into_iter().map(|(shift, j)| (shift, k, j)));
         }
         all.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
@@ -282,48 +323,60 @@ impl<'a> PairsNow<'a> {
         let [a, b] = self.pairs.both(pair.meeting as usize);
         let is_penalty = contacts.regime == ContactRegime::Penalty;
         let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.point.offset);
+        let friction = self.friction(pair, candidate, laws);
+        let carrier = if friction.is_some() { self.carrier(pair, partner) } else { 0 };
+        let carried = match (friction, partner) {
+            (Some(_), Some(partner)) => self.carried(pair, carrier, partner),
+            _ => CarriedTraction::default(),
+        };
         PairLaw {
             radii: [a.radius + offset, b.radius],
             normal,
-            friction: None,
-            carried: CarriedTraction::default(),
-            carrier: 0,
+            friction,
+            carried,
+            carrier,
             free: candidate.free,
             weight: candidate.weight,
         }
     }
 
-    #[allow(clippy::too_many_arguments)]
     fn point<const NA: usize, const NB: usize>(
         &self,
-        number: usize,
-        pair: &ListedPair,
-        candidate: &PairCandidate,
-        partner: Option<(usize, &'a PairPointMemory)>,
+        part: &Part<'a>,
         law: PairLaw,
         weights: Weights,
         out: &mut ElementSystem,
     ) -> Option<PairPoint<'a>> {
-        let [a, b] = [0, 1].map(|side| (self.pairs.nodes_of(pair)[side], candidate.at[side]));
-        let a = PairSide::<NA> { nodes: std::array::from_fn(|i| self.node(&a.0[i])), shape: ShapeAt::new(a.1) };
-        let b = PairSide::<NB> { nodes: std::array::from_fn(|i| self.node(&b.0[i])), shape: ShapeAt::new(b.1) };
+        let Part { number, pair, candidate, partner } = *part;
+        let a = self.pair_side::<NA>(&pair, 0, candidate.at[0], &law);
+        let b = self.pair_side::<NB>(&pair, 1, candidate.at[1], &law);
         let state = add_pair(&a, &b, &law, weights, out)?;
         let mut shapes = [[0.0; 4]; 2];
         shapes[0][..NA].copy_from_slice(&a.shape.values);
         shapes[1][..NB].copy_from_slice(&b.shape.values);
-        Some(PairPoint { number, pair: *pair, candidate: *candidate, partner, law, state, place: a.place(), shapes })
+        let carrier = b.nodes[law.carrier].rotation.r;
+        Some(PairPoint { number, pair, candidate, partner, law, state, carrier, place: a.place(), shapes })
     }
 
-    fn node(&self, node: &super::ChainNode) -> ContactNode {
-        ContactNode {
-            place: node.place + self.at.q[node.node.u as usize],
-            velocity: self.at.v[node.node.u as usize],
-            rotation: Rotation::new(Vec3::ZERO),
-            before: NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY },
-        }
+    /// One of both elements of a pair at the place of a point.
+    fn pair_side<const N: usize>(&self, pair: &ListedPair, side: usize, at: f64, law: &PairLaw) -> PairSide<N> {
+        let nodes = self.pairs.nodes_of(pair)[side];
+        let node = |i: usize| {
+            let node = &nodes[i];
+            let place = node.place + self.at.q[node.node.u as usize];
+            let velocity = self.at.v[node.node.u as usize];
+            if law.friction.is_none() {
+                let before = NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY };
+                return ContactNode { place, velocity, rotation: Rotation::new(Vec3::ZERO), before };
+            }
+            let before = self.before(pair, law.carrier, [side, i]);
+            ContactNode { place, velocity, rotation: self.at.rotation(node.node.p), before }
+        };
+        PairSide { nodes: std::array::from_fn(node), shape: ShapeAt::new(at) }
     }
 
-    /// The memory of a point with a force.
+    /// The memory of a point with a force. Before a state is accepted, traction and normal remain
+    /// those of the last one.
     pub fn memory_of(&self, point: &PairPoint, accepts: bool) -> PairPointMemory {
         let PairPoint { pair, candidate, state, law, .. } = point;
         let [a, _] = self.pairs.both(pair.meeting as usize);
@@ -331,10 +384,23 @@ impl<'a> PairsNow<'a> {
         let offset = law.radii[0] - a.radius;
         let gap = state.gap + offset;
         let force = state.normal_force.force;
+        let normal = point.normal();
         // Stages go on with the first stiffness.
         let first = self.stiffness(pair).augmented * contacts.first_factor;
         let is_penalty = contacts.regime == ContactRegime::Penalty;
         let before = point.partner.filter(|_| is_penalty).map(|(_, before)| before.point);
+        let known = point.partner.map_or(CarriedTraction::default(), |(_, known)| CarriedTraction {
+            force: known.point.traction,
+            normal: known.point.normal,
+            slides: known.point.slides,
+        });
+        let carried = if accepts {
+            let slides = state.status() == Status::Slides;
+            let now = CarriedTraction { force: point.traction(), normal, slides };
+            self.laws[self.pairs.contact_of(pair.meeting as usize)].carried(&law.normal, force, now)
+        } else {
+            known
+        };
         PairPointMemory {
             meeting: pair.meeting,
             kind: candidate.kind,
@@ -346,35 +412,41 @@ impl<'a> PairsNow<'a> {
                 force,
                 multiplier: if accepts { force + first * gap } else { force },
                 gap,
-                traction: Vec3::ZERO,
-                normal: state.normal,
-                slides: false,
+                traction: carried.force,
+                normal: carried.normal,
+                slides: carried.slides,
                 offset: before.map_or(0.0, |before| before.offset),
                 steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
-                push: state.normal * (force * candidate.weight),
-                at: point.place - state.normal * (a.radius + 0.5 * gap),
+                push: (normal * force + point.traction()) * candidate.weight,
+                at: point.place - normal * (a.radius + 0.5 * gap),
             },
         }
     }
-}
 
-/// The points in memory that a candidate may have been, each with the distance of its place in
-/// elements.
-fn links(pair: &ListedPair, candidate: &PairCandidate, memory: &[PairPointMemory]) -> Vec<(f64, usize)> {
-    let along = [0, 1].map(|side| f64::from(pair.elements[side]) + candidate.at[side]);
-    let first = memory.partition_point(|point| point.point.place < along[0] - LARGEST_SHIFT);
-    let near = memory[first..].iter().take_while(|point| point.point.place <= along[0] + LARGEST_SHIFT);
-    let mut links = Vec::new();
-    for (j, point) in near.enumerate().filter(|(_, point)| point.kind == candidate.kind) {
-        let shifts = [point.point.place - along[0], point.on_second - along[1]].map(f64::abs);
-        let is_same = match candidate.kind {
-            PairPointKind::Closest => true,
-            PairPointKind::NodeOfFirst => shifts[0] == 0.0,
-            PairPointKind::NodeOfSecond => shifts[1] == 0.0,
-        };
-        if is_same && shifts[1] <= LARGEST_SHIFT {
-            links.push((shifts[0] + shifts[1], first + j));
+    /// The points in memory of a meeting that a candidate may have been, each with the distance of
+    /// its place in elements.
+    fn links(&self, pair: &ListedPair, candidate: &PairCandidate, memory: &[PairPointMemory]) -> Vec<(f64, usize)> {
+        let strands = self.pairs.both(pair.meeting as usize);
+        let along = [0, 1].map(|side| f64::from(pair.elements[side]) + candidate.at[side]);
+        // The memory is in the order of places; a ring goes on at its start.
+        let goes_round = strands[0].is_closed();
+        let is_before = |point: &PairPointMemory| !goes_round && point.point.place < along[0] - LARGEST_SHIFT;
+        let first = memory.partition_point(is_before);
+        let is_near = |point: &&PairPointMemory| goes_round || point.point.place <= along[0] + LARGEST_SHIFT;
+        let mut links = Vec::new();
+        for (j, point) in memory[first..].iter().take_while(is_near).enumerate() {
+            let places = [point.point.place, point.on_second];
+            let shifts = [0, 1].map(|side| strands[side].shift(places[side], along[side]));
+            let is_same = match candidate.kind {
+                PairPointKind::Closest => true,
+                PairPointKind::NodeOfFirst => shifts[0] == 0.0,
+                PairPointKind::NodeOfSecond => shifts[1] == 0.0,
+            };
+            let is_near = shifts.iter().all(|&shift| shift <= LARGEST_SHIFT);
+            if point.kind == candidate.kind && is_same && is_near {
+                links.push((shifts[0] + shifts[1], first + j));
+            }
         }
+        links
     }
-    links
 }

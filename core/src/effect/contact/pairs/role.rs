@@ -19,7 +19,7 @@ pub(in crate::effect::contact) struct PairRole<'a> {
 }
 
 impl<'a> PairRole<'a> {
-    fn now(self, at: &'a State) -> PairsNow<'a> {
+    pub(super) fn now(self, at: &'a State) -> PairsNow<'a> {
         PairsNow::new(self.pairs, self.laws, at, &at.contacts.pairs.list)
     }
 
@@ -27,7 +27,7 @@ impl<'a> PairRole<'a> {
         self.now(at).each_point(Weights::NONE, &mut |point, _| visit(point));
     }
 
-    fn law_of(self, meeting: u32) -> &'a ContactLaws {
+    pub(super) fn law_of(self, meeting: u32) -> &'a ContactLaws {
         &self.laws[self.pairs.contact_of(meeting as usize)]
     }
 
@@ -59,20 +59,32 @@ impl<'a> PairRole<'a> {
                 let of_nodes = nodes[side].iter().zip(point.shapes[side]);
                 of_nodes.fold(Vec3::ZERO, |sum, (node, factor)| sum + field[node.node.u as usize] * factor)
             });
-            largest = largest.max((moved[0] - moved[1]).dot(point.state.normal).abs() / length);
+            let apart = moved[0] - moved[1];
+            let sticks = point.state.status() == Status::Sticks;
+            let strain = if sticks { apart.norm() } else { apart.dot(point.normal()).abs() };
+            largest = largest.max(strain / length);
         });
         largest
     }
 
-    /// Writes the points with a force into the memory of a state.
-    pub fn remember(self, at: &mut State, accepts: bool) {
+    /// Writes the points with a force into the memory of a state. Gives the energy that friction has
+    /// taken: its work, less what elastic stick has stored.
+    pub fn remember(self, at: &mut State, accepts: bool) -> f64 {
+        let known = at.contacts.pairs.points.clone();
+        let mut goes_on = vec![false; known.len()];
         let mut points = Vec::new();
+        let mut taken = if accepts { self.stick_energy(at) } else { 0.0 };
         let now = self.now(at);
         now.each_point(Weights::NONE, &mut |point, _| {
             if point.state.normal_force.force > 0.0 {
                 points.push(now.memory_of(point, accepts));
+                point.partner.into_iter().for_each(|(number, _)| goes_on[number] = true);
+                taken -= if accepts { point.friction_work() } else { 0.0 };
             }
         });
+        if !accepts {
+            points.extend(kept_tractions(&known, &goes_on));
+        }
         let order = |a: &PairPointMemory, b: &PairPointMemory| {
             let places = |point: &PairPointMemory| [point.point.place, point.on_second];
             let [a_places, b_places] = [places(a), places(b)];
@@ -83,6 +95,10 @@ impl<'a> PairRole<'a> {
         };
         points.sort_by(order);
         at.contacts.pairs.points = Arc::new(points);
+        if accepts && self.rubs() {
+            at.contacts.pairs.nodes = Arc::new(self.pairs.poses(at));
+        }
+        if accepts { taken - self.stick_energy(at) } else { 0.0 }
     }
 
     /// Makes the list of an accepted state.
@@ -97,7 +113,7 @@ impl<'a> PairRole<'a> {
         let mut points = (*at.contacts.pairs.points).clone();
         let now = self.now(at);
         for point in &mut points {
-            let stiffness = now.stiffness_at(point.meeting as usize, point);
+            let stiffness = now.stiffness_at(point);
             change(&mut point.point, &stiffness);
         }
         at.contacts.pairs.points = Arc::new(points);
@@ -125,13 +141,21 @@ impl<'a> PairRole<'a> {
         let now = self.now(at);
         let mut active = 0;
         let mut is_other = false;
+        let mut slides = false;
         now.each_point(Weights::NONE, &mut |point, _| {
             if point.state.normal_force.force > 0.0 {
                 active += 1;
                 is_other = is_other || !now.is_among(point, known);
+                slides = slides || point.state.status() == Status::Slides;
             }
         });
-        if is_other || active != known.len() { ContactChange::Touches } else { ContactChange::None }
+        if slides {
+            ContactChange::Slides
+        } else if is_other || active != known.len() {
+            ContactChange::Touches
+        } else {
+            ContactChange::None
+        }
     }
 
     /// The deepest penetration among all listed pairs that act, if it is larger than `allowed` times
@@ -176,8 +200,21 @@ impl<'a> PairRole<'a> {
         if list.is_empty() {
             return None;
         }
+        let mut turned = None;
+        self.each(to, &mut |point| {
+            if point.state.traction.turned_over {
+                turned = Some(self.slot_of(&point.pair));
+            }
+        });
+        if turned.is_some() {
+            return turned;
+        }
         let [before, after] = [from, to].map(|at| self.pairs.places(at));
-        let passes = |pair: &&ListedPair| self.pairs.least_part(pair, &before, &after, 0.0) < 1.0;
+        // A fast approach from far away may come near, but for a tenth of the distance in contact.
+        let passes = |pair: &&ListedPair| {
+            let [a, b] = self.pairs.both(pair.meeting as usize);
+            self.pairs.least_part(pair, &before, &after, [0.0, a.radius + b.radius]) < 1.0
+        };
         list.iter().filter(|pair| self.acts(pair, to)).find(passes).map(|pair| self.slot_of(pair))
     }
 
@@ -190,7 +227,7 @@ impl<'a> PairRole<'a> {
         let before = self.pairs.places(at);
         let nodes = self.pairs.strands.iter().flat_map(|strand| &strand.nodes);
         let after: Vec<Vec3> = nodes.zip(&before).map(|(node, x)| *x + increment[node.node.u as usize]).collect();
-        let part = |pair: &ListedPair| self.pairs.least_part(pair, &before, &after, 0.0);
+        let part = |pair: &ListedPair| self.pairs.least_part(pair, &before, &after, [0.0, f64::INFINITY]);
         list.iter().filter(|pair| self.acts(pair, at)).map(part).fold(1.0, f64::min)
     }
 
@@ -198,7 +235,7 @@ impl<'a> PairRole<'a> {
     pub fn energy(self, at: &State) -> f64 {
         let mut energy = 0.0;
         self.each(at, &mut |point| energy += point.candidate.weight * point.law.normal.energy(point.state.gap));
-        energy
+        energy + self.stick_energy(at)
     }
 
     /// Energy per time that damping takes: p_el c (dg/dt)^2.
@@ -243,7 +280,9 @@ impl<'a> PairRole<'a> {
             let meeting = &self.pairs.meetings[point.meeting as usize];
             let [first, _] = self.pairs.both(point.meeting as usize);
             sum.normal += point.weight * point.point.force;
+            sum.friction += point.weight * point.point.traction.norm();
             sum.points += 1;
+            sum.sliding += usize::from(point.point.slides);
             if !meeting.is_own() {
                 sum.force += point.point.push;
                 sum.moment += point.point.at.cross(point.point.push);
@@ -257,38 +296,50 @@ impl<'a> PairRole<'a> {
         }
     }
 
-    /// The normal force per length on a beam at a part of its length: of nodes, and linear between
-    /// them.
-    pub fn force_along(self, beam: usize, fraction: f64, at: &State) -> f64 {
-        let mut sum = 0.0;
+    /// Normal force and friction per length on a beam at a part of its length: of nodes, and linear
+    /// between them.
+    pub fn force_along(self, beam: usize, fraction: f64, at: &State) -> [f64; 2] {
+        let mut sum = [0.0; 2];
         for (number, strand) in self.pairs.strands.iter().enumerate().filter(|(_, strand)| strand.beam == Some(beam)) {
             let place = strand.along(fraction) * strand.order as f64;
             let before = place.floor();
             let part = place - before;
             for (node, factor) in [(before, 1.0 - part), (before + 1.0, part)] {
                 if factor > 0.0 {
-                    sum += factor * self.force_at_node(number, node, at);
+                    let force = self.force_at_node(number, node, at);
+                    sum = [0, 1].map(|k| sum[k] + factor * force[k]);
                 }
             }
         }
         sum
     }
 
-    /// The normal force per length at a node of a strand, by its number there: linear shape functions
-    /// distribute the forces of points to the nodes beside them.
-    fn force_at_node(self, number: usize, node: f64, at: &State) -> f64 {
+    /// Normal force and friction per length at a node of a strand, by its number there: linear shape
+    /// functions distribute the forces of points to the nodes beside them.
+    fn force_at_node(self, number: usize, node: f64, at: &State) -> [f64; 2] {
         let strand = &self.pairs.strands[number];
         let order = strand.order as f64;
-        let mut force = 0.0;
+        let mut forces = [0.0; 2];
         for point in &*at.contacts.pairs.points {
             let strands = self.pairs.meetings[point.meeting as usize].strands;
             for (side, place) in [point.point.place, point.on_second].into_iter().enumerate() {
                 if strands[side] == number {
-                    let near = 1.0 - (place * order - node).abs();
-                    force += point.weight * point.point.force * near.max(0.0);
+                    let near = (1.0 - order * strand.shift(place, node / order)).max(0.0);
+                    forces[0] += point.weight * point.point.force * near;
+                    forces[1] += point.weight * point.point.traction.norm() * near;
                 }
             }
         }
-        force / strand.share(node / order)
+        forces.map(|force| force / strand.share(node / order))
     }
+}
+
+/// Points in memory that an augmentation finds open. Their tractions are those of the last converged
+/// state, and return with the contact.
+fn kept_tractions(known: &[PairPointMemory], goes_on: &[bool]) -> impl Iterator<Item = PairPointMemory> {
+    let open = known.iter().zip(goes_on).filter(|(point, goes_on)| !**goes_on && point.point.traction != Vec3::ZERO);
+    open.map(|(point, _)| PairPointMemory {
+        point: PointMemory { force: 0.0, multiplier: 0.0, ..point.point },
+        ..*point
+    })
 }

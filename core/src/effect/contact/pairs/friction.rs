@@ -1,0 +1,138 @@
+//! Friction of beams on beams.
+//!
+//! Memory holds places and rotations of nodes, tractions and normals at the last converged state in
+//! global axes. A node of the second beam carries a pair: its rotation then, and its rotation now,
+//! lead from global axes to those in which the friction law sees both beams.
+
+use super::candidate::PairCandidate;
+use super::point::{PairPoint, PairsNow};
+use super::{BeamPairs, PairRole};
+use crate::effect::contact::laws::ContactLaws;
+use crate::kernel::contact::{CarriedTraction, FrictionLaw, NodeBefore};
+use crate::system::{ContactRegime, ListedPair, PairPointMemory, State};
+use crate::tensor::Mat3;
+
+impl BeamPairs {
+    /// Places and rotations of all nodes in a state (global axes).
+    pub(super) fn poses(&self, at: &State) -> Vec<NodeBefore> {
+        let nodes = self.strands.iter().flat_map(|strand| &strand.nodes);
+        let pose = |node: &super::ChainNode| NodeBefore {
+            place: node.place + at.q[node.node.u as usize],
+            rotation: at.rotation(node.node.p).r,
+        };
+        nodes.map(pose).collect()
+    }
+}
+
+impl<'a> PairsNow<'a> {
+    /// Coulomb's law at a candidate; `None` without friction. The coefficient is that at the place on
+    /// the first beam; where a beam touches itself it is the mean of both places.
+    pub(super) fn friction(
+        &self,
+        pair: &ListedPair,
+        candidate: &PairCandidate,
+        laws: &ContactLaws,
+    ) -> Option<FrictionLaw> {
+        if !laws.rubs() {
+            return None;
+        }
+        let strands = self.pairs.both(pair.meeting as usize);
+        let coefficient_on = |side: usize| {
+            let [from, to] = super::arcs_of(strands[side], pair.elements[side] as usize);
+            let fraction = (from + (to - from) * candidate.at[side]) / strands[side].length;
+            laws.friction_at(fraction)
+        };
+        let coefficient = if self.pairs.meetings[pair.meeting as usize].is_own() {
+            0.5 * (coefficient_on(0) + coefficient_on(1))
+        } else {
+            coefficient_on(0)
+        };
+        let stiffness = self.stick(pair, laws);
+        (coefficient > 0.0).then_some(FrictionLaw { coefficient, stiffness })
+    }
+
+    /// K_t of a pair.
+    fn stick(&self, pair: &ListedPair, laws: &ContactLaws) -> f64 {
+        let first = self.stiffness(pair);
+        laws.stick
+            * match self.at.contacts.regime {
+                ContactRegime::Augmented => first.augmented,
+                ContactRegime::Penalty => first.penalty,
+            }
+    }
+
+    /// The node of the second element that carries a pair. It stays where the point moves along the
+    /// element: the node nearest to the place of the point at the last converged state, or one in the
+    /// middle.
+    pub(super) fn carrier(&self, pair: &ListedPair, partner: Option<&PairPointMemory>) -> usize {
+        let strand = self.pairs.both(pair.meeting as usize)[1];
+        let order = strand.order;
+        let Some(partner) = partner else { return order.div_ceil(2) };
+        let mut along = partner.on_second - f64::from(pair.elements[1]);
+        if strand.is_closed() {
+            // The shorter way round from the middle of the element.
+            let count = strand.elements() as f64;
+            along -= count * ((along - 0.5) / count).round();
+        }
+        let along = along * order as f64;
+        along.round().clamp(0.0, order as f64) as usize
+    }
+
+    /// The traction of a point at the last converged state, in the axes of its carrier then.
+    pub(super) fn carried(&self, pair: &ListedPair, carrier: usize, partner: &PairPointMemory) -> CarriedTraction {
+        let rotation = self.pose(pair, [1, carrier]).rotation;
+        CarriedTraction {
+            force: rotation.transpose_mul(partner.point.traction),
+            normal: rotation.transpose_mul(partner.point.normal),
+            slides: partner.point.slides && self.at.contacts.goes_on,
+        }
+    }
+
+    /// A node of a pair, by its side and its number, as the carrier saw it at the last converged
+    /// state.
+    pub(super) fn before(&self, pair: &ListedPair, carrier: usize, node: [usize; 2]) -> NodeBefore {
+        let carrier = self.pose(pair, [1, carrier]);
+        let node = self.pose(pair, node);
+        NodeBefore::of(node.place, node.rotation, carrier.place, &carrier.rotation)
+    }
+
+    /// A node of a pair at the last converged state, or at the start of the run.
+    fn pose(&self, pair: &ListedPair, [side, node]: [usize; 2]) -> NodeBefore {
+        let of = self.pairs.elements_of(pair)[side];
+        let strand = &self.pairs.strands[of.strand];
+        let number = of.element * strand.order + node;
+        let known = self.at.contacts.pairs.nodes.get(self.pairs.first_nodes[of.strand] + number);
+        let initial = NodeBefore { place: strand.nodes[number].place, rotation: Mat3::IDENTITY };
+        known.copied().unwrap_or(initial)
+    }
+}
+
+impl PairPoint<'_> {
+    /// The work that friction has done on both beams since the last converged state, of the mean
+    /// traction; negative.
+    pub(super) fn friction_work(&self) -> f64 {
+        let traction = &self.state.traction;
+        let before = self.law.carried.carried_to(self.state.normal);
+        self.candidate.weight * (traction.force + before).dot(traction.sliding) * 0.5
+    }
+}
+
+impl PairRole<'_> {
+    /// The energy of elastic stick of the points in memory.
+    pub(in crate::effect::contact) fn stick_energy(self, at: &State) -> f64 {
+        let now = self.now(at);
+        let of_point = |point: &PairPointMemory| {
+            let laws = self.law_of(point.meeting);
+            if !laws.rubs() {
+                return 0.0;
+            }
+            point.weight * point.point.traction.squared() / (2.0 * now.stick(&now.pair_of(point), laws))
+        };
+        at.contacts.pairs.points.iter().map(of_point).sum()
+    }
+
+    /// True if some contact of beams has friction.
+    pub(super) fn rubs(self) -> bool {
+        self.pairs.meetings.iter().enumerate().any(|(k, _)| self.laws[self.pairs.contact_of(k)].rubs())
+    }
+}
