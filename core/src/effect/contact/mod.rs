@@ -7,6 +7,7 @@
 mod chain;
 mod laws;
 mod pairs;
+mod reach;
 mod resultant;
 mod shown;
 mod strand;
@@ -24,7 +25,7 @@ use super::{
     Roles, TangentForm,
 };
 use crate::kernel::contact::{
-    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Side, Status,
+    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Status,
     add_point,
 };
 use crate::kernel::{ElementSystem, Weights};
@@ -218,30 +219,6 @@ impl SurfaceContacts {
         self.pairs().judge_penalty(at);
     }
 
-    /// The part of an increment, up to 1, on which no node goes deeper into a surface around it by more
-    /// than its radius. A long wire in a tube is nearly without stiffness until it touches: a whole
-    /// correction may lead far out of the tube, where all nodes push back at once.
-    fn part_within_reach(&self, at: &State, increment: &[Vec3]) -> f64 {
-        let mut part = 1.0f64;
-        if at.contacts.regime == ContactRegime::Penalty {
-            return part;
-        }
-        for (chain, _, surface) in self.acting(at).filter(|(_, _, surface)| surface.surface.side == Side::Inside) {
-            let carrier = surface.carrier(at, Weights::NONE);
-            let carried = surface.slots().map_or(Vec3::ZERO, |[u, _]| increment[u as usize]);
-            for node in &chain.nodes {
-                let moved = increment[node.node.u as usize] - carried;
-                if moved.norm() > chain.radius {
-                    let from = carrier.on_surface(node.place + at.q[node.node.u as usize]);
-                    let to = from + carrier.rotation.r.transpose_mul(moved);
-                    let [before, after] = [from, to].map(|y| surface.surface.value(y, chain.radius));
-                    part = part.min(part_of_way(before, after, chain.radius));
-                }
-            }
-        }
-        part
-    }
-
     fn damping_power(&self, at: &State) -> f64 {
         let mut power = 0.0;
         if at.contacts.regime == ContactRegime::Penalty && self.laws.iter().any(|laws| laws.damping != 0.0) {
@@ -252,14 +229,6 @@ impl SurfaceContacts {
         }
         power
     }
-}
-
-/// The part of a way, up to 1, on which a section of a radius does not go deeper by more than that;
-/// distances of its centre are given before and after it.
-fn part_of_way(before: Option<f64>, after: Option<f64>, radius: f64) -> f64 {
-    let (Some(before), Some(after)) = (before, after) else { return 1.0 };
-    let allowed = (before - radius).max(0.0) + radius;
-    if before - after > allowed { allowed / (before - after) } else { 1.0 }
 }
 
 /// Places, followed by the middles between each two neighbours.
