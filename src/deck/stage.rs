@@ -88,6 +88,17 @@ impl StageBody {
         }
     }
 
+    /// The stage as messages call it.
+    pub fn in_words(&self) -> &'static str {
+        match self {
+            Self::Static { .. } => "a static stage",
+            Self::Path { .. } => "control = \"arc_length\"",
+            Self::Modal { .. } => "a modal stage",
+            Self::Buckling { .. } => "a buckling stage",
+            Self::Dynamic { .. } => "a dynamic stage",
+        }
+    }
+
     /// Load levels or increments along a path, at most.
     pub fn increments(&self) -> Option<usize> {
         match *self {

@@ -173,11 +173,10 @@ fn refuse_idle_tables(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 /// A path whose load factor turns back cannot follow a history of it.
 fn refuse_histories_on_paths(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     for (number, stage) in deck.stages.iter().enumerate() {
-        let what = match stage.body {
-            StageBody::Path { .. } => "control = \"arc_length\"",
-            StageBody::Buckling { .. } => "a buckling stage",
-            StageBody::Static { .. } | StageBody::Modal { .. } | StageBody::Dynamic { .. } => continue,
-        };
+        if !matches!(stage.body, StageBody::Path { .. } | StageBody::Buckling { .. }) {
+            continue;
+        }
+        let what = stage.body.in_words();
         for history in histories_in(deck, number + 1) {
             let message = format!("{what} does not support `history`: its load factor may decrease");
             let diagnostic = Diagnostic::error(message, history.span.clone());

@@ -20,14 +20,14 @@ pub fn check(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         else {
             continue;
         };
-        let refused = match stage.body {
-            StageBody::Static { .. } | StageBody::Dynamic { .. } => continue,
-            StageBody::Modal { .. } | StageBody::Buckling { .. } if !rubs(deck) => continue,
-            StageBody::Path { .. } => "control = \"arc_length\" does not support [[contact]]",
-            StageBody::Modal { .. } => "a modal stage does not support [[contact]] with friction",
-            StageBody::Buckling { .. } => "a buckling stage does not support [[contact]] with friction",
-        };
-        let diagnostic = Diagnostic::error(refused, stage.span.clone());
+        let looks = !stage.body.kind().advances_state();
+        let is_supported = matches!(stage.body, StageBody::Static { .. } | StageBody::Dynamic { .. });
+        if is_supported || (looks && !rubs(deck)) {
+            continue;
+        }
+        let what = if looks { "[[contact]] with friction" } else { "[[contact]]" };
+        let message = format!("{} does not support {what}", stage.body.in_words());
+        let diagnostic = Diagnostic::error(message, stage.span.clone());
         let help = format!("give `{}` the `stages` in which it acts, without this one", contact.name.value);
         diagnostics.push(diagnostic.help(help).context(contact.name.span.clone(), "this contact"));
     }

@@ -167,12 +167,9 @@ fn companions(original: Original, sampler: &Sampler) -> Vec<Vec<Comparison>> {
         let step = |variant: &Variant| variant.step(deck).unwrap_or(1.0);
         let ratio = |variant: &Variant| step(variant) / step(&with(1.0));
         // The step of the deck may be reduced to a whole part of an interval.
-        let cut = dynamic_stages(deck).find_map(|(_, body)| match body {
-            StageBody::Dynamic { step: wanted, .. } => Some(step(&with(1.0)) / wanted),
-            StageBody::Static { .. }
-            | StageBody::Path { .. }
-            | StageBody::Modal { .. }
-            | StageBody::Buckling { .. } => None,
+        let cut = dynamic_stages(deck).find_map(|(_, body)| {
+            let StageBody::Dynamic { step: wanted, .. } = body else { return None };
+            Some(step(&with(1.0)) / wanted)
         });
         let others = [0.5 * cut.unwrap_or(1.0), 2.0].map(with).into_iter().filter(|other| ratio(other) != 1.0);
         let divisor = |ratio: f64| divisor_in_time(ratio) / safety(ratio);
@@ -211,15 +208,13 @@ pub fn polylines(deck: &Deck) -> Vec<String> {
 /// interval.
 pub fn refuse_paths(deck: &Deck) -> Result<(), Diagnostic> {
     for stage in &deck.stages {
-        let message = match stage.body {
-            StageBody::Path { .. } => "error bars need runs with common rows: arc length does not give them",
-            StageBody::Dynamic { step_tolerance: Some(_), .. } if deck.output.interval.is_none() => {
-                "error bars need runs with common rows: with adaptive steps, set [output] interval"
-            }
-            StageBody::Static { .. }
-            | StageBody::Dynamic { .. }
-            | StageBody::Modal { .. }
-            | StageBody::Buckling { .. } => continue,
+        let adapts = matches!(stage.body, StageBody::Dynamic { step_tolerance: Some(_), .. });
+        let message = if matches!(stage.body, StageBody::Path { .. }) {
+            "error bars need runs with common rows: arc length does not give them"
+        } else if adapts && deck.output.interval.is_none() {
+            "error bars need runs with common rows: with adaptive steps, set [output] interval"
+        } else {
+            continue;
         };
         return Err(Diagnostic::error(message, stage.span.clone()));
     }

@@ -562,3 +562,14 @@ fn coarse_guidewires_come_through_the_first_curve() {
         assert!(errors[0].abs() < 0.03 && errors[1].abs() < 1e-3, "{elements} elements: {errors:?}");
     }
 }
+
+/// A contact that ends with its stage has no forces in the next one.
+#[test]
+fn a_contact_that_has_ended_has_no_forces() {
+    let text = under_cylinder(20, 1, 4, "stages = [1]\n") + "[[stage]]\nkind = \"static\"\nsteps = 2\n";
+    let simulation = simulate(&text);
+    let forces = simulation.column("push.normal");
+    assert!(forces[4] > 1.0, "{forces:?}");
+    let (points, last) = (simulation.column("push.points"), forces.len() - 1);
+    assert_eq!((forces[last], points[last]), (0.0, 0.0));
+}

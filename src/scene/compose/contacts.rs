@@ -2,7 +2,7 @@
 
 use super::{Composer, stage_set};
 use crate::deck::{
-    self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, SectionBody, Shape, Spanned,
+    self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, SectionBody, Shape, Spanned, Stage,
     StageBody, SurfaceMotion,
 };
 use crate::scene::joints::FoundJoint;
@@ -388,12 +388,8 @@ fn idle_names(deck: &Deck) -> Vec<&Spanned<String>> {
 
 /// The shortest time step that dynamic stages of a deck begin with.
 fn shortest_step(deck: &Deck) -> Option<f64> {
-    let steps = deck.stages.iter().filter_map(|stage| match stage.body {
-        StageBody::Dynamic { step, .. } => Some(step),
-        StageBody::Static { .. } | StageBody::Path { .. } | StageBody::Modal { .. } | StageBody::Buckling { .. } => {
-            None
-        }
-    });
+    let step = |stage: &Stage| if let StageBody::Dynamic { step, .. } = stage.body { Some(step) } else { None };
+    let steps = deck.stages.iter().filter_map(step);
     steps.min_by(f64::total_cmp)
 }
 

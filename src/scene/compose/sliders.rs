@@ -166,13 +166,11 @@ impl Composer<'_> {
 /// Refuses sliders in stages that cannot treat them.
 fn refuse_stages(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     for stage in &deck.stages {
-        let refused = match stage.body {
-            StageBody::Static { .. } | StageBody::Dynamic { .. } => continue,
-            StageBody::Path { .. } => "control = \"arc_length\" does not support [[slider]]",
-            StageBody::Modal { .. } => "a modal stage does not support [[slider]]",
-            StageBody::Buckling { .. } => "a buckling stage does not support [[slider]]",
-        };
-        let diagnostic = Diagnostic::error(refused, stage.span.clone());
+        if matches!(stage.body, StageBody::Static { .. } | StageBody::Dynamic { .. }) {
+            continue;
+        }
+        let message = format!("{} does not support [[slider]]", stage.body.in_words());
+        let diagnostic = Diagnostic::error(message, stage.span.clone());
         diagnostics.push(diagnostic.context(deck.sliders[0].span.clone(), "this slider"));
     }
 }

@@ -5,7 +5,7 @@ use super::estimate::{ErrorShare, Fall, Outputs, Pair, Source, left_by_newton};
 use super::indicator::{self, PlacedMesh};
 use super::round::{Compared, Round, Trials};
 use super::{CUBIC, Found, Meshes, coarser, has_long_steps, scaled};
-use crate::deck::{Accuracy, Beam, StageBody};
+use crate::deck::{Accuracy, Beam, Stage, StageBody};
 use crate::study::StudyError;
 use crate::study::cost::{Companion, Family, Mesher, Pace, Placement, Pool, Trial, Variant};
 use beamsim_core::failure::FailureKind;
@@ -340,13 +340,8 @@ impl<'a> Search<'a> {
     }
 
     fn is_too_large(&self, variant: &Variant) -> bool {
-        let ends = self.mesher.original.deck.stages.iter().filter_map(|stage| match stage.body {
-            StageBody::Dynamic { end, .. } => Some(end),
-            StageBody::Static { .. }
-            | StageBody::Path { .. }
-            | StageBody::Modal { .. }
-            | StageBody::Buckling { .. } => None,
-        });
+        let end = |stage: &Stage| if let StageBody::Dynamic { end, .. } = stage.body { Some(end) } else { None };
+        let ends = self.mesher.original.deck.stages.iter().filter_map(end);
         let steps = variant.step(self.mesher.original.deck).map_or(0.0, |step| ends.fold(0.0, f64::max) / step);
         variant.count() * self.family.order.unwrap_or(1) > MOST_NODES || steps > MOST_STEPS
     }

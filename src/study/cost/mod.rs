@@ -203,15 +203,12 @@ fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
     };
     let start = StageClock { stage: 1, clock: 0.0 };
     let StageClock { stage, clock } = stored.clocks().last().unwrap_or(start);
-    let early = match last.body {
-        StageBody::Dynamic { end, .. } if stage == k + 1 => last.until.is_none() && clock < end * (1.0 - 1e-9),
-        StageBody::Static { .. }
-        | StageBody::Path { .. }
-        | StageBody::Modal { .. }
-        | StageBody::Buckling { .. }
-        | StageBody::Dynamic { .. } => stage < k + 1,
+    let ends_early = if let StageBody::Dynamic { end, .. } = last.body {
+        last.until.is_none() && clock < end * (1.0 - 1e-9)
+    } else {
+        false
     };
-    if early {
+    if stage < k + 1 || (stage == k + 1 && ends_early) {
         let message = format!("the given history ends at {clock:.6} of stage {stage}, before the deck does");
         let mut diagnostic = Diagnostic::error(message, last.span.clone());
         diagnostic.help = Some("use a history of the whole run, or shorten the run by --set".into());
