@@ -202,9 +202,12 @@ impl Importer<'_> {
     /// Files of triangles; those that stand in the text already are not read again.
     fn meshes(&mut self, document: &mut DocumentMut) {
         let known = |path: &str| document.get("mesh").and_then(|meshes| meshes.get(path)).is_some();
-        let Some(surfaces) = document.get("surface").and_then(Item::as_array_of_tables) else { return };
-        let is_mesh = |surface: &&Table| surface.get("kind").and_then(Item::as_str) == Some("mesh");
-        let paths = surfaces.iter().filter(is_mesh).filter_map(|surface| surface.get("file")?.as_str());
+        let Some(surfaces) = document.get("surface") else { return };
+        let tables = surfaces.as_array_of_tables().into_iter().flatten().map(|table| table as &dyn TableLike);
+        let inline = surfaces.as_array().into_iter().flatten().filter_map(Value::as_inline_table);
+        let all = tables.chain(inline.map(|table| table as &dyn TableLike));
+        let is_mesh = |surface: &&dyn TableLike| surface.get("kind").and_then(Item::as_str) == Some("mesh");
+        let paths = all.filter(is_mesh).filter_map(|surface| surface.get("file")?.as_str());
         let mut paths: Vec<String> = paths.filter(|path| !known(path)).map(str::to_string).collect();
         paths.sort();
         paths.dedup();

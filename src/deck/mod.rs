@@ -70,7 +70,7 @@ pub use joint::{Joint, JointMotor, JointParts};
 pub use layup::{Layup, Ply};
 pub use load::{Frame, Load, LoadTarget, LoadVector};
 pub use material::{Elastic, Isotropic, Material, Strength};
-pub use mesh_file::{MeshTable, Triangles};
+pub use mesh_file::MeshTable;
 pub use motion::{Motion, MotionWhat};
 pub use observable::{Looked, looking_at};
 pub use output::Output;

@@ -155,13 +155,8 @@ impl Chain {
     }
 
     /// The number of the last point in memory of each candidate: the nearest ones first, each once.
-    /// Both touch the same thing; what remains may pass from edge to edge where `surface` has facets.
-    pub(super) fn matched(
-        &self,
-        surface: &Surface,
-        candidates: &[Candidate],
-        memory: Option<&ChainMemory>,
-    ) -> Vec<Option<usize>> {
+    /// Both touch the same thing; what remains passes from edge to edge.
+    pub(super) fn matched(&self, candidates: &[Candidate], memory: Option<&ChainMemory>) -> Vec<Option<usize>> {
         let mut partner = vec![None; candidates.len()];
         let Some(memory) = memory else { return partner };
         let mut pairs: Vec<(bool, f64, usize, usize)> = Vec::new();
@@ -178,7 +173,7 @@ impl Chain {
             for (j, point) in points[first..].iter().take_while(may_be_near).enumerate() {
                 let shift = self.shift(point.place, along);
                 let is_other = point.edge != candidate.edge;
-                let may_pass = surface.has_facets() && point.edge.is_some() && candidate.edge.is_some();
+                let may_pass = point.edge.is_some() && candidate.edge.is_some();
                 if shift <= LARGEST_SHIFT && (!is_other || may_pass) {
                     pairs.push((is_other, shift, k, first + j));
                 }
@@ -330,7 +325,10 @@ impl SeenChain<'_> {
         let mut found = Vec::new();
         for number in self.edges_of(k) {
             let Some(edge) = self.surface.edge(number) else { continue };
-            let is_beside = |s: f64| edge.is_beside(self.place(k, s));
+            let is_beside = |s: f64| {
+                let place = self.place(k, s);
+                edge.is_beside(place) && self.surface.owns_corner(number, place)
+            };
             let at = |s: f64, place: Place| Candidate { element: k, s, place, edge: Some(number) };
             let minima = self.minima(k, &|y| edge.distance(y).ok());
             let smooth = minima.found().iter().filter(|minimum| minimum.kind != MinimumKind::Kink);

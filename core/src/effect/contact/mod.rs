@@ -16,7 +16,7 @@ mod surface;
 pub use chain::Chain;
 pub use laws::ContactLaws;
 pub use pairs::{BeamPairs, Meeting};
-pub use shown::NodeContact;
+pub use shown::{ContactParty, NodeContact, NodeContacts};
 pub use strand::{ChainNode, ContactStiffness, Strand};
 pub use surface::{SceneSurface, SurfaceCarrier};
 
@@ -107,7 +107,7 @@ impl SurfaceContacts {
         let carrier = surface.carrier(at, weights);
         let memory = at.contacts.chains.get(number);
         let candidates = chain.candidates(&surface.surface, &carrier, memory, at);
-        let partners = chain.matched(&surface.surface, &candidates, memory);
+        let partners = chain.matched(&candidates, memory);
         ChainNow { chain, laws: &self.laws[chain.contact], surface, carrier, memory, at, candidates, partners }
     }
 
@@ -613,7 +613,7 @@ impl Contacts for SurfaceContacts {
                     slides.push(point.state.status() == Status::Slides);
                 }
             });
-            let partners = chain.chain.matched(&chain.surface.surface, &active, memory);
+            let partners = chain.chain.matched(&active, memory);
             let is_other = active.len() != memory.map_or(0, |memory| memory.points.len());
             if slides.contains(&true) {
                 change = ContactChange::Slides;
