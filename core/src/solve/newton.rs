@@ -155,7 +155,6 @@ impl Newton {
     ) -> Result<(), NewtonFailure> {
         self.stress_predictor.forget(assembly);
         let round_off = assembly.round_off(state);
-        let switches_before = work.chart_switches;
         let mut solution = Solution {
             newton: self,
             model,
@@ -172,10 +171,6 @@ impl Newton {
         };
         solution.begin();
         let found = solution.find();
-        if found.is_err() {
-            // Iterates that diverge pass through many charts, none of which stays.
-            solution.work.chart_switches = switches_before;
-        }
         // Whatever it ended with, an interrupted solution is none.
         NewtonFailure::unless_interrupted().and(found)
     }

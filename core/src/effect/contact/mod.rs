@@ -7,7 +7,6 @@
 mod chain;
 mod laws;
 mod pairs;
-mod reach;
 mod resultant;
 mod shown;
 mod strand;
@@ -557,7 +556,7 @@ impl Contacts for SurfaceContacts {
     }
 
     fn safe_part(&self, at: &State, increment: &[Vec3]) -> f64 {
-        self.pairs().safe_part(at, increment).min(self.part_within_reach(at, increment))
+        self.pairs().safe_part(at, increment)
     }
 
     fn augment(&self, at: &mut State) {

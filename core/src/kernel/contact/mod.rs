@@ -3,7 +3,8 @@
 //! Sections are round with a radius r for contact, whatever their stiffness. A contact adds f =
 //! dW/dq, in the sign of internal forces (g = f_int + f_acc - f_ext), and K = df/dq.
 //!
-//! Order of reading: [`surface`], [`edge`], [`tube`], [`mesh`] (distance, normal and curvature of rigid surfaces),
+//! Order of reading: [`surface`], [`edge`], [`tube`], [`mesh`] (distance, normal and curvature of
+//! rigid surfaces),
 //! [`law`] (normal force of a gap), [`friction`] (traction by return mapping), [`point`] (forces
 //! and tangent of one contact point), [`along`] (closest points that move along an element),
 //! [`beam_pair`] (the same of two elements), [`pair_search`] (their closest points, and motions that
