@@ -5,7 +5,7 @@
 //! numbers of corners, as bytes in Base64.
 
 use super::diagnostic::{Diagnostic, Severity, Spanned};
-use super::import::{Unreadable, fingerprint};
+use super::files::{Unreadable, fingerprint};
 use super::reader::{Context, Item, Table};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -12,8 +12,8 @@
 //! Beside the edge this is the distance from the box ([`super::surface`]); over its faces it is
 //! larger. Of the edges that meet at a corner one touches what is nearest to the corner.
 
-use super::distance::{Distance, Feature, Undefined, sphere};
-use super::surface::{Shape, Side, Surface, cylinder};
+use super::distance::{Distance, Feature, Side, Undefined, cylinder, sphere};
+use super::surface::{Shape, Surface};
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 

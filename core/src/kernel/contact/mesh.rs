@@ -12,10 +12,9 @@
 //! Points whose closest point lies exactly on the border of a face, as on a diagonal of a flat side,
 //! belong to the face.
 
-use super::distance::{Distance, Feature, Undefined, sphere};
+use super::distance::{Distance, Feature, Side, Undefined, cylinder, plane, sphere};
 use super::mesh_parts::{Bend, MeshEdge, MeshError, Parts};
 use super::mesh_tree::{Tree, from_line};
-use super::surface::{Side, cylinder, plane};
 use crate::scalar::Real;
 use crate::tensor::Vec3;
 

@@ -139,7 +139,8 @@ fn pipe(sections: &[(Vec3, f64)]) -> Vec<Vec<Vec3>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::surface::{Side, tests::shapes};
+    use super::super::distance::Side;
+    use super::super::surface::tests::shapes;
     use super::*;
 
     /// Points of all lines lie on the surface; those at the ends of cones and straight tubes may lie
