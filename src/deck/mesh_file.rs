@@ -161,7 +161,7 @@ impl Builder {
         let mut corners = [0; 3];
         for (corner, place) in corners.iter_mut().zip(places) {
             if let Some(x) = place.into_iter().find(|x| x.is_nan() || x.abs() > LARGEST) {
-                return Err(format!("a corner has the coordinate {x}"));
+                return Err(format!("a corner has the coordinate {x:?}"));
             }
             // Zero has one sign.
             let place = place.map(|x| x + 0.0);
@@ -308,7 +308,7 @@ mod tests {
             ("a.stl", binary(b"", &solids())[..200].to_vec(), "with 4 triangles it would have 284 bytes, it has 200"),
             ("a.stl", long, "it has 285"),
             ("a.stl", text_stl().replacen("vertex 1 0 0", "vertex 1 o 0", 1).into_bytes(), "triangle 1: "),
-            ("a.stl", text_stl().as_bytes()[..400].to_vec(), "ends before `endsolid`"),
+            ("a.stl", text_stl().as_bytes()[..200].to_vec(), "ends before `endsolid`"),
             ("a.stl", text_stl().replacen("endloop", "", 1).into_bytes(), "triangle 1: "),
             ("a.obj", TETRAHEDRON.replace("f 3 1 4", "f 3 1 9").into_bytes(), "ace"),
             ("a.obj", TETRAHEDRON.replace("v 0 0 1\n", "v 0 0 1e200\n").into_bytes(), "coordinate 1e200"),

