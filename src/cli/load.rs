@@ -176,8 +176,8 @@ fn beside(deck: &Path, name: &str) -> Result<Vec<u8>, Unreadable> {
     table(&path_beside(deck, name))
 }
 
-/// The content of a file beside a deck. Only plain files are read: a deck from elsewhere must not make the program
-/// wait for a device.
+/// The content of a file beside a deck. Only plain files are read: a deck from elsewhere must not
+/// make the program wait for a device.
 pub fn table(path: &Path) -> Result<Vec<u8>, Unreadable> {
     let unreadable = |message: String| Unreadable { message, severity: Severity::File };
     let found = std::fs::metadata(path).map_err(|error| unreadable(OutputError::file(path, error).to_string()))?;

@@ -71,7 +71,7 @@ const EXPLAINED: &[Explained] = &[
     Explained { table: "deck", written: &["boundary", "boundaries", "boundary_condition", "boundary_conditions", "bc", "bcs", "constraint", "constraints", "fix", "fixed", "clamp", "anchor", "encastre", "restraint", "restraints", "roller", "single_point_constraint", "sp"], help: "use [[support]]" },
     Explained { table: "deck", written: &["motor", "motors", "actuator", "actuators", "drive", "drives"], help: "a motor is the key `angle` or `displacement` of a [[joint]]" },
     Explained { table: "deck", written: &["control", "controller", "controllers", "feedback"], help: "feedback control is not supported yet; a motor of a [[joint]] follows a [history.NAME]" },
-    Explained { table: "deck", written: &["mesh", "element", "elements", "num_elem", "n_elem", "part", "instance", "assembly"], help: "use `elements` of [[beam]]" },
+    Explained { table: "deck", written: &["element", "elements", "num_elem", "n_elem", "part", "instance", "assembly"], help: "use `elements` of [[beam]]" },
     Explained { table: "deck", written: &["node", "nodes", "nset", "coords"], help: "nodes follow from `elements` of [[beam]]; name places in [point]" },
     Explained { table: "deck", written: &["bodies", "mass", "masses", "point_mass", "rigid_body", "rigid_bodies", "rigid", "link", "lumped_mass", "lumped", "hub", "nacelle", "rigid_link", "mpc", "marker", "markers"], help: "use [[body]]" },
     Explained { table: "deck", written: &["damper", "dampers", "dashpot", "rayleigh", "rayleigh_damping", "damp"], help: "use [damping] (Rayleigh), or `damping` of [[spring]] and [[joint]]" },

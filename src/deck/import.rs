@@ -3,25 +3,16 @@
 
 use super::beam::StationsWord;
 use super::diagnostic::Severity;
+use super::files::{Unreadable, fingerprint};
 use super::mesh_file::Triangles;
 use super::{Diagnostic, Span, Words};
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
-use xxhash_rust::xxh3::xxh3_64;
 
 /// Rows of a table, at most.
 const MOST_ROWS: usize = 1_000_000;
 
 /// Gives the content of a file that a deck names.
 pub type Open<'o> = &'o dyn Fn(&str) -> Result<Vec<u8>, Unreadable>;
-
-/// Why a file that a deck names could not be read.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Unreadable {
-    /// The reason, with the path
-    pub message: String,
-    /// The kind of error
-    pub severity: Severity,
-}
 
 /// The text of a deck, and the tables that it imports.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,12 +33,6 @@ pub struct ImportedTable {
     pub rows: usize,
     /// A fingerprint of the content of its file
     pub hash: String,
-}
-
-/// The fingerprint of a file: XXH3 of 64 bits. It finds files that have changed; it does not prove
-/// who wrote them.
-pub fn fingerprint(content: &[u8]) -> String {
-    format!("xxh3:{:016x}", xxh3_64(content))
 }
 
 /// Replaces everything that a deck imports by the rows of the files.
@@ -202,9 +187,12 @@ impl Importer<'_> {
     /// Files of triangles; those that stand in the text already are not read again.
     fn meshes(&mut self, document: &mut DocumentMut) {
         let known = |path: &str| document.get("mesh").and_then(|meshes| meshes.get(path)).is_some();
-        let Some(surfaces) = document.get("surface").and_then(Item::as_array_of_tables) else { return };
-        let is_mesh = |surface: &&Table| surface.get("kind").and_then(Item::as_str) == Some("mesh");
-        let paths = surfaces.iter().filter(is_mesh).filter_map(|surface| surface.get("file")?.as_str());
+        let Some(surfaces) = document.get("surface") else { return };
+        let tables = surfaces.as_array_of_tables().into_iter().flatten().map(|table| table as &dyn TableLike);
+        let inline = surfaces.as_array().into_iter().flatten().filter_map(Value::as_inline_table);
+        let all = tables.chain(inline.map(|table| table as &dyn TableLike));
+        let is_mesh = |surface: &&dyn TableLike| surface.get("kind").and_then(Item::as_str) == Some("mesh");
+        let paths = all.filter(is_mesh).filter_map(|surface| surface.get("file")?.as_str());
         let mut paths: Vec<String> = paths.filter(|path| !known(path)).map(str::to_string).collect();
         paths.sort();
         paths.dedup();

@@ -4,13 +4,13 @@
 //! that all later steps have one whole text: the numbers of vertices and triangles, coordinates and
 //! numbers of corners, as bytes in Base64.
 
-use super::diagnostic::{Severity, Spanned};
-use super::import::{Unreadable, fingerprint};
+use super::diagnostic::{Diagnostic, Severity, Spanned};
+use super::files::{Unreadable, fingerprint};
 use super::reader::{Context, Item, Table};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::collections::HashMap;
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use std::sync::Arc;
 use tobj::LoadError;
 
@@ -40,6 +40,12 @@ pub struct Triangles {
     pub vertices: Vec<[f64; 3]>,
     /// Numbers of the corners of each triangle
     pub corners: Vec<[u32; 3]>,
+}
+
+/// Triangles that are being read.
+#[derive(Default)]
+struct Builder {
+    triangles: Triangles,
     /// The number of each vertex by the bits of its coordinates
     known: HashMap<[u64; 3], u32>,
 }
@@ -48,6 +54,12 @@ pub struct Triangles {
 pub(super) const KEYS: [&str; 1] = ["data"];
 
 pub(super) fn read_mesh<'a>(context: &'a Context, name: Spanned<String>, item: &'a Item<'a>) -> Option<MeshTable> {
+    if item.get_ref().as_table().is_none() {
+        let help = "a mesh of triangles is the `file` of a [[surface]] of kind = \"mesh\"; for elements use `elements` of [[beam]]";
+        context
+            .report(Diagnostic::error("`mesh` contains the triangles of files: [mesh.NAME]", item.span()).help(help));
+        return None;
+    }
     let table = Table::new(context, item, format!("[mesh.{}]", name.value), &KEYS)?;
     let data = table.required_text("data")?;
     Some(MeshTable { name, data: data.value.into() })
@@ -75,7 +87,6 @@ impl MeshTable {
         Some(Triangles {
             vertices: places.chunks_exact(24).map(vertex).collect(),
             corners: numbers.chunks_exact(12).map(triangle).collect(),
-            known: HashMap::new(),
         })
     }
 }
@@ -95,7 +106,7 @@ impl Triangles {
             return Err(wrong("the file contains no triangles".into()));
         }
         if found.corners.len() > MOST_TRIANGLES {
-            let message = format!("{} triangles are more than the limit of {MOST_TRIANGLES}", found.corners.len());
+            let message = format!("more triangles than the limit of {MOST_TRIANGLES}");
             return Err(Unreadable { message, severity: Severity::Limit });
         }
         Ok(found)
@@ -114,14 +125,14 @@ impl Triangles {
         let whole = whole_stl(content)?;
         let mut reader = Cursor::new(whole);
         let triangles = stl_io::create_stl_reader(&mut reader).map_err(|error| error.to_string())?;
-        let mut out = Self::default();
+        let mut out = Builder::default();
         for (k, triangle) in triangles.enumerate().take(MOST_TRIANGLES + 1) {
             let of_triangle = |message: String| format!("triangle {}: {message}", k + 1);
             let triangle = triangle.map_err(|error| of_triangle(error.to_string()))?;
             let places = triangle.vertices.map(|vertex| [0, 1, 2].map(|axis| f64::from(vertex[axis])));
             out.push(places).map_err(of_triangle)?;
         }
-        Ok(out)
+        Ok(out.triangles)
     }
 
     fn of_obj(content: &[u8]) -> Result<Self, String> {
@@ -131,34 +142,36 @@ impl Triangles {
         let no_materials = |_: &std::path::Path| Err(LoadError::GenericFailure);
         let read = tobj::load_obj_buf(&mut shapes.as_bytes(), &options, no_materials);
         let (models, _) = read.map_err(|error| error.to_string())?;
-        let mut out = Self::default();
+        let mut out = Builder::default();
         for mesh in models.iter().map(|model| &model.mesh) {
             for corners in mesh.indices.chunks_exact(3) {
                 let place = |corner: u32| [0, 1, 2].map(|axis| mesh.positions[3 * corner as usize + axis]);
-                let number = out.corners.len() + 1;
+                let number = out.triangles.corners.len() + 1;
                 let places = [corners[0], corners[1], corners[2]].map(place);
                 out.push(places).map_err(|message| format!("triangle {number}: {message}"))?;
             }
         }
-        Ok(out)
+        Ok(out.triangles)
     }
+}
 
+impl Builder {
     /// Adds a triangle; corners at the same place are one vertex.
     fn push(&mut self, places: [[f64; 3]; 3]) -> Result<(), String> {
         let mut corners = [0; 3];
         for (corner, place) in corners.iter_mut().zip(places) {
             if let Some(x) = place.into_iter().find(|x| x.is_nan() || x.abs() > LARGEST) {
-                return Err(format!("a corner has the coordinate {x}"));
+                return Err(format!("a corner has the coordinate {x:?}"));
             }
             // Zero has one sign.
             let place = place.map(|x| x + 0.0);
-            let new = self.vertices.len() as u32;
+            let new = self.triangles.vertices.len() as u32;
             *corner = *self.known.entry(place.map(f64::to_bits)).or_insert(new);
             if *corner == new {
-                self.vertices.push(place);
+                self.triangles.vertices.push(place);
             }
         }
-        self.corners.push(corners);
+        self.triangles.corners.push(corners);
         Ok(())
     }
 }
@@ -176,10 +189,7 @@ fn whole_stl(content: &[u8]) -> Result<Vec<u8>, String> {
     let start = content.iter().position(|byte| !byte.is_ascii_whitespace()).unwrap_or(content.len());
     let text = &content[start..];
     if text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) {
-        let after = text.iter().position(|byte| *byte == b'\n').unwrap_or(text.len());
-        let mut whole = b"solid mesh".to_vec();
-        text[after..].to_ascii_lowercase().as_slice().read_to_end(&mut whole).map_err(|error| error.to_string())?;
-        return Ok(whole);
+        return all_solids(&String::from_utf8_lossy(text).to_ascii_lowercase());
     }
     match (count, binary_length) {
         (Some(count), Some(length)) => Err(format!(
@@ -189,6 +199,17 @@ fn whole_stl(content: &[u8]) -> Result<Vec<u8>, String> {
         )),
         _ => Err(format!("an STL file has {STL_HEAD} bytes or more, this one has {}", content.len())),
     }
+}
+
+/// The facets of all solids of a text as one solid: the reader ends with the first.
+fn all_solids(text: &str) -> Result<Vec<u8>, String> {
+    let lines = || text.lines().map(str::trim).filter(|line| !line.is_empty());
+    if !lines().next_back().is_some_and(|line| line.starts_with("endsolid")) {
+        return Err("the file ends before `endsolid`".into());
+    }
+    let facets = lines().filter(|line| !line.starts_with("solid") && !line.starts_with("endsolid"));
+    let facets: String = facets.flat_map(|line| [line, "\n"]).collect();
+    Ok(format!("solid mesh\n{facets}endsolid mesh\n").into_bytes())
 }
 
 /// A line with a vertex or a face, the corners of which are reduced to their vertices: nothing else of
@@ -251,6 +272,11 @@ mod tests {
             assert_eq!(stl, text);
             assert_eq!(stl, Triangles::read("a.stl", text_stl().to_uppercase().as_bytes()).unwrap());
         }
+        // A file of two solids.
+        let text = text_stl();
+        let (first, second) = text.split_at(text.match_indices("endfacet\n").nth(1).unwrap().0 + 9);
+        let two = format!("{first}endsolid a\n\nsolid b\n{second}");
+        assert_eq!(Triangles::read("a.stl", two.as_bytes()).unwrap().corners.len(), 4);
         let places = |triangles: &Triangles| -> Vec<[[f64; 3]; 3]> {
             triangles.corners.iter().map(|corners| corners.map(|k| triangles.vertices[k as usize])).collect()
         };
@@ -282,7 +308,8 @@ mod tests {
             ("a.stl", binary(b"", &solids())[..200].to_vec(), "with 4 triangles it would have 284 bytes, it has 200"),
             ("a.stl", long, "it has 285"),
             ("a.stl", text_stl().replacen("vertex 1 0 0", "vertex 1 o 0", 1).into_bytes(), "triangle 1: "),
-            ("a.stl", text_stl().as_bytes()[..400].to_vec(), "triangle "),
+            ("a.stl", text_stl().as_bytes()[..200].to_vec(), "ends before `endsolid`"),
+            ("a.stl", text_stl().replacen("endloop", "", 1).into_bytes(), "triangle 1: "),
             ("a.obj", TETRAHEDRON.replace("f 3 1 4", "f 3 1 9").into_bytes(), "ace"),
             ("a.obj", TETRAHEDRON.replace("v 0 0 1\n", "v 0 0 1e200\n").into_bytes(), "coordinate 1e200"),
             ("a.obj", TETRAHEDRON.replace("v 0 0 1\n", "v 0 0 nan\n").into_bytes(), "coordinate NaN"),

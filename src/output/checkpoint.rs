@@ -120,7 +120,13 @@ fn body(bytes: &[u8]) -> Option<&[u8]> {
 /// what may change when a run is resumed: title, expectations, the choice of rows, and the ends of
 /// stages from number `first_open` on, from 0.
 fn fingerprint(scene: &Scene, first_open: usize) -> u64 {
-    let mut deck = scene.resolved.clone();
+    let all = scene.resolved.as_object();
+    let meshes = all.and_then(|deck| deck.get("mesh")).and_then(Value::as_object);
+    // Megabytes of triangles are not copied and printed for each checkpoint.
+    let hash = |mesh: &Value| mesh.get("data").and_then(Value::as_str).map_or(0, |data| xxh3_64(data.as_bytes()));
+    let meshes: Vec<u64> = meshes.into_iter().flat_map(|meshes| meshes.values()).map(hash).collect();
+    let entries = all.into_iter().flatten().filter(|(key, _)| *key != "mesh");
+    let mut deck: Value = entries.map(|(key, value)| (key.clone(), value.clone())).collect();
     let stages = deck.get_mut("stage").and_then(Value::as_array_mut);
     for stage in stages.into_iter().flatten().skip(first_open).filter_map(Value::as_object_mut) {
         stage.retain(|key, _| !["end", "until"].contains(&key.as_str()));
@@ -131,7 +137,7 @@ fn fingerprint(scene: &Scene, first_open: usize) -> u64 {
     if let Some(deck) = deck.as_object_mut() {
         deck.retain(|key, _| !["title", "expect"].contains(&key.as_str()));
     }
-    xxh3_64(deck.to_string().as_bytes())
+    xxh3_64(format!("{deck}{meshes:?}").as_bytes())
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@ use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Meshes that are kept, at most.
-const MOST_KEPT: usize = 16;
+/// Triangles of the meshes that are kept, at most; of a larger mesh the last one is kept.
+const MOST_KEPT: usize = 500_000;
 
 /// The mesh of a file whose origin is at `at`; `axes` are the unit vectors of the file's coordinates,
 /// with its scale.
@@ -28,7 +28,7 @@ pub fn mesh(deck: &Deck, file: &Spanned<String>, at: Vec3, axes: Mat3) -> Result
 /// A mesh that bounds a body, or the reason why it does not; `None` without triangles.
 type Built = Option<Result<Arc<TriangleMesh>, MeshError>>;
 
-/// A mesh, which is built once a process.
+/// A mesh: those that were asked for last are kept, so that the points of a sweep share them.
 fn kept(table: &MeshTable, at: Vec3, axes: Mat3) -> Built {
     static KEPT: Mutex<VecDeque<(String, Built)>> = Mutex::new(VecDeque::new());
     // Numbers in it are written with all their digits.
@@ -42,8 +42,10 @@ fn kept(table: &MeshTable, at: Vec3, axes: Mat3) -> Built {
         TriangleMesh::new(triangles.vertices.iter().map(place).collect(), &triangles.corners).map(Arc::new)
     });
     kept.push_back((key, built.clone()));
-    if kept.len() > MOST_KEPT {
-        kept.pop_front();
+    let faces = |built: &Built| built.iter().flatten().map(|mesh| mesh.face_count()).sum::<usize>();
+    let mut all: usize = kept.iter().map(|(_, built)| faces(built)).sum();
+    while all > MOST_KEPT && kept.len() > 1 {
+        all -= kept.pop_front().map_or(0, |(_, built)| faces(&built));
     }
     built
 }
@@ -62,7 +64,7 @@ fn refuse(file: &Spanned<String>, error: MeshError) -> Diagnostic {
             (format!("vertex {} is not finite", vertex + 1), "make `scale` smaller, or mend the file")
         }
         MeshError::NoVertex(triangle) => {
-            (format!("triangle {} has a corner that does not exist", triangle + 1), "write the file anew")
+            (format!("triangle {} has a corner that does not exist", triangle + 1), "export the file again")
         }
         MeshError::Degenerate(triangle, place) => (
             format!("triangle {} at {} has no area", triangle + 1, point(place)),
@@ -78,11 +80,15 @@ fn refuse(file: &Spanned<String>, error: MeshError) -> Diagnostic {
         ),
         MeshError::Turned(triangle, ends) => (
             format!(
-                "triangle {} is turned over: its neighbour at {} looks to the other side",
+                "triangle {} is turned over: its neighbour at {} has the opposite orientation",
                 triangle + 1,
                 edge(ends)
             ),
             "let the program that wrote the file make all normals point outward",
+        ),
+        MeshError::Folded(ends) => (
+            format!("two triangles lie on one another at {}", edge(ends)),
+            "divide faces that are not convex into triangles in the program that wrote the file",
         ),
         MeshError::InsideOut => {
             ("all of its normals point inward".into(), "flip them; for beams inside of the body use side = \"inside\"")

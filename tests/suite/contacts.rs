@@ -345,6 +345,78 @@ step = 2.5e-4
     )
 }
 
+/// A box of half edges of one, as a mesh file.
+const BOX: &str = "v -1 -1 -1\nv -1 -1 1\nv -1 1 -1\nv -1 1 1\nv 1 -1 -1\nv 1 -1 1\nv 1 1 -1\nv 1 1 1\n\
+                   f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n";
+
+/// The text of a deck with the triangles of the file that it names.
+fn with_file(text: &str, content: &str) -> Result<String, String> {
+    let imported = beamsim::deck::import(text, &|_| Ok(content.into()));
+    imported.map(|imported| imported.text).map_err(|found| found[0].message.clone())
+}
+
+/// A box as a mesh gives the same motion as the box itself.
+#[test]
+fn rods_that_fall_on_meshed_boxes_move_as_on_boxes() {
+    let mut random = Random::new(17);
+    for case in 0..6 {
+        let text = rod_on_box(&mut random).replace("end = 0.4", "end = 0.3");
+        let start = text.find("half = [").unwrap();
+        let end = start + text[start..].find('\n').unwrap();
+        let half: Vec<f64> = text[start + 8..end - 1].split(", ").map(|x| x.parse().unwrap()).collect();
+        let coordinates = |line: &str| -> String {
+            let scaled = line.split(' ').skip(1).zip(&half).map(|(x, half)| x.parse::<f64>().unwrap() * half);
+            scaled.map(|x| format!(" {x:?}")).collect()
+        };
+        let scaled =
+            |line: &str| if line.starts_with('v') { format!("v{}\n", coordinates(line)) } else { format!("{line}\n") };
+        let file: String = BOX.lines().map(scaled).collect();
+        let meshed = text.replace("kind = \"box\"", "kind = \"mesh\"").replace(&text[start..end], "file = \"box.obj\"");
+        let [exact, meshed] = [text, with_file(&meshed, &file).unwrap()].map(|text| simulate(&text));
+        let [exact, meshed] = [exact, meshed].map(|simulation| simulation.column("energy.kinetic"));
+        let largest = exact.iter().copied().fold(0.0, f64::max);
+        let differs = exact.iter().zip(&meshed).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest;
+        println!("case {case}: {differs:.1e}");
+        assert!(exact.len() == meshed.len() && differs < 1e-5, "case {case}: {differs}");
+    }
+}
+
+#[test]
+fn meshes_that_bound_no_body_are_refused_with_their_place() {
+    let deck = under_cylinder(4, 1, 1, "");
+    let start = deck.find("kind = \"cylinder\"").unwrap();
+    let end = deck.find("move = ").unwrap();
+    let deck = format!("{}kind = \"mesh\"\nfile = \"part.obj\"\nat = [0.7, 0, 3]\n{}", &deck[..start], &deck[end..]);
+    let built = |file: &str| refusal(&with_file(&deck, file).unwrap());
+    for (file, told) in [
+        (BOX.replace("f 1 2 4 3\n", ""), "part.obj does not bound a body: the edge from"),
+        (BOX.replace("f 1 2 4 3", "f 1 3 4 2"), "is turned over"),
+        (BOX.replace("v 1 1 1", "v 1 1 -1"), "has no area"),
+        (format!("{BOX}f 1 2 8\n"), "belongs to more than two triangles"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".into(), "fewer than four triangles"),
+        (inside_out(), "all of its normals point inward"),
+    ] {
+        let found = built(&file);
+        assert!(found.contains(told), "{found}");
+    }
+    assert!(with_file(&deck, "v 0 0 zero\nf 1 1 1\n").unwrap_err().contains("part.obj"));
+    assert!(with_file(&deck.replace("part.obj", "part.ply"), BOX).unwrap_err().contains(".stl or .obj"));
+    let unread = refusal(&deck);
+    assert!(unread.contains("the mesh `part.obj` was not read"), "{unread}");
+}
+
+/// The box with all of its faces turned.
+fn inside_out() -> String {
+    let turned = |line: &str| {
+        let mut words: Vec<&str> = line.split(' ').collect();
+        if words[0] == "f" {
+            words[1..].reverse();
+        }
+        words.join(" ") + "\n"
+    };
+    BOX.lines().map(turned).collect()
+}
+
 /// Edges of a box are touched between nodes, too: energy is kept, and no rod passes through. In one
 /// case a closest point of a bent element ends in contact, which takes 1 % of the energy.
 #[test]

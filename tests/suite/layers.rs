@@ -58,7 +58,7 @@ const CRATES: [(&str, &[&str]); 22] = [
     ),
     ("serde", &["src/output/", "src/study/", "src/cli/json.rs", "core/src/"]),
     ("postcard", &["src/output/checkpoint.rs"]),
-    ("xxhash_rust", &["src/output/", "src/deck/import.rs"]),
+    ("xxhash_rust", &["src/output/", "src/deck/files.rs"]),
     ("thiserror", &["src/output/", "src/study/", "src/cli/"]),
     ("base64", &["src/output/report/", "src/deck/mesh_file.rs"]),
     ("stl_io", &["src/deck/mesh_file.rs"]),

@@ -137,10 +137,8 @@ def hold_contacts(data, row):
     """The forces at all nodes have the resultant of the history, and the least gap at nodes is not below that of all points."""
     force, gap = data.GetArray("contact_force"), data.GetArray("gap")
     nodes = range(force.GetNumberOfTuples())
-    # The body is a point of its own at the place of the last node.
-    own = [k for k in nodes if k != len(POINTS)]
     for axis, name in enumerate(("fx", "fy", "fz")):
-        close(sum(force.GetTuple(k)[axis] for k in own), float(row[f"stop.{name}"]), name, 1e-9)
+        close(sum(force.GetTuple(k)[axis] for k in nodes), float(row[f"stop.{name}"]), name, 1e-9)
     gaps = [gap.GetValue(k) for k in nodes if not math.isnan(gap.GetValue(k))]
     if len(gaps) != 6 or min(gaps) < float(row["stop.gap"]) - 1e-12:
         raise SystemExit(f"gaps {gaps}, least {row['stop.gap']}")

@@ -2,7 +2,7 @@
 //! strains and resultants.
 
 use super::place::{BeamPoint, Place};
-use crate::effect::contact::SurfaceContacts;
+use crate::effect::contact::{ContactParty, SurfaceContacts};
 use crate::rotation::{Rotation, principal};
 use crate::section::Vector6;
 use crate::section::recovery::{Measure, PlacedRecovery};
@@ -98,12 +98,16 @@ impl Figure {
     /// is there to touch. `None` without contacts.
     pub fn contacts_at(&self, state: &State) -> Option<Vec<(f64, Vec3)>> {
         let nodes = self.contacts.as_ref()?.at_nodes(state);
-        let of_place = |place: &Place| {
-            let contact = place.node().and_then(|node| nodes.get(&node.u));
+        let beams = self.lines.iter().enumerate();
+        let parties = beams.flat_map(|(beam, line)| line.points.iter().map(move |_| Some(ContactParty::Beam(beam))));
+        let bodies = self.bodies.iter().map(|body| body.node().map(|node| ContactParty::Body(node.u)));
+        let parties = parties.chain(bodies).chain(std::iter::repeat(None));
+        let of_place = |(place, party): (&Place, Option<ContactParty>)| {
+            let contact = party.and_then(|party| nodes.get(&(party, place.node()?.u)));
             let gap = contact.map_or(f64::NAN, |contact| contact.gap);
             (if gap.is_finite() { gap } else { f64::NAN }, contact.map_or(Vec3::ZERO, |contact| contact.force))
         };
-        Some(self.places().map(of_place).collect())
+        Some(self.places().zip(parties).map(of_place).collect())
     }
 
     /// The places of all looks.

@@ -35,6 +35,8 @@ pub struct ContactMemory {
     /// The number of steps of the shortest contact in the present dynamic stage, from the step with
     /// its first force to the last one; none if no contact has ended
     pub shortest: Option<u32>,
+    /// True if nothing was near to anything at the last converged state, and nothing rubs
+    pub is_clear: bool,
     /// Contacts of each chain: a beam or a body against a surface
     pub chains: Arc<Vec<ChainMemory>>,
     /// Pairs of beam elements, and their contacts
@@ -52,6 +54,7 @@ impl Default for ContactMemory {
             damping_power: 0.0,
             deepest: 0.0,
             shortest: None,
+            is_clear: false,
             chains: Arc::default(),
             pairs: PairsMemory::default(),
         }

@@ -3,12 +3,12 @@
 use super::super::{Row, Units};
 use super::encode::{base64, quantised};
 use crate::scene::Scene;
-use beamsim_core::effect::contact::SceneSurface;
+use beamsim_core::effect::contact::{ContactParty, SceneSurface};
 use beamsim_core::kernel::contact::Shape;
 use beamsim_core::model::SlotKind;
 use beamsim_core::probe::{Figure, Look, Place};
 use beamsim_core::run::Snapshot;
-use beamsim_core::system::{Node, Slot, State};
+use beamsim_core::system::{Node, State};
 use beamsim_core::tensor::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -201,7 +201,8 @@ impl Film {
 
     /// Drops every other frame where there are too many.
     fn thin(&mut self) {
-        let points: usize = self.shown.iter().map(Vec::len).sum();
+        let forces = self.reel.frames.last().map_or(0, |frame| frame.forces.len());
+        let points = self.shown.iter().map(Vec::len).sum::<usize>() + forces;
         let most =
             (MOST_LOOKS / points.max(1)).clamp(LEAST_FRAMES, MOST_FRAMES).min(MOST_LOOKS_EVER.div_ceil(points.max(1)));
         if self.reel.frames.len() > 2 * most {
@@ -225,23 +226,21 @@ impl Film {
     /// As the page takes it; `row` gives the number of a row of the history among those that are shown.
     pub fn to_json(&self, row: &dyn Fn(usize) -> usize, units: &Units) -> Value {
         let places = initial(&self.figure, &self.shown);
-        let radii: Vec<(Slot, f64)> = self.figure.contacts.iter().flat_map(|contacts| contacts.radii()).collect();
-        let radius = |of: Option<&(Node, Vec3)>| {
-            let (node, _) = of?;
-            radii.iter().find(|(slot, _)| *slot == node.u).map(|(_, radius)| *radius)
-        };
+        let radii: Vec<(ContactParty, f64)> =
+            self.figure.contacts.iter().flat_map(|contacts| contacts.radii()).collect();
+        let radius = |of: ContactParty| radii.iter().find(|(party, _)| *party == of).map(|(_, radius)| *radius);
         let mut first = 0;
         let mut beams = Vec::new();
-        for (line, shown) in self.figure.lines.iter().zip(&self.shown) {
+        for (number, (line, shown)) in self.figure.lines.iter().zip(&self.shown).enumerate() {
             // Of a thinned beam elements are not whole.
             let order = if shown.len() == line.points.len() { line.order } else { 1 };
             let nodes: Vec<usize> = (first..first + shown.len()).collect();
-            let radius = radius(places.get(first));
+            let radius = radius(ContactParty::Beam(number));
             beams.push(json!({ "name": line.name, "nodes": nodes, "order": order, "closed": false, "radius": radius }));
             first += shown.len();
         }
         let nodes = |all: &[usize]| all.iter().map(|node| json!({ "node": node })).collect::<Vec<_>>();
-        let body = |k: usize| json!({ "node": k, "radius": radius(places.get(k)) });
+        let body = |k: usize| json!({ "node": k, "radius": radius(ContactParty::Body(places[k].0.u)) });
         let bodies: Vec<Value> = (first..first + self.figure.bodies.len()).map(body).collect();
         let ends: Vec<usize> = (first + bodies.len()..places.len()).collect();
         let frames = || self.reel.frames.iter();

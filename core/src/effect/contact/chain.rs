@@ -154,12 +154,12 @@ impl Chain {
         gap > 0.0 && self.nodes.iter().all(|node| (place(node) - middle).squared() < reach * reach)
     }
 
-    /// The number of the last point in memory of each candidate that touches the same thing: the
-    /// nearest ones first, each once.
+    /// The number of the last point in memory of each candidate: the nearest ones first, each once.
+    /// Both touch the same thing; what remains passes from edge to edge.
     pub(super) fn matched(&self, candidates: &[Candidate], memory: Option<&ChainMemory>) -> Vec<Option<usize>> {
         let mut partner = vec![None; candidates.len()];
         let Some(memory) = memory else { return partner };
-        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        let mut pairs: Vec<(bool, f64, usize, usize)> = Vec::new();
         let mut first = 0;
         // A ring goes on at its start.
         let goes_round = self.is_closed();
@@ -172,14 +172,16 @@ impl Chain {
             let may_be_near = |point: &&PointMemory| goes_round || point.place <= along + LARGEST_SHIFT;
             for (j, point) in points[first..].iter().take_while(may_be_near).enumerate() {
                 let shift = self.shift(point.place, along);
-                if shift <= LARGEST_SHIFT && point.edge == candidate.edge {
-                    pairs.push((shift, k, first + j));
+                let is_other = point.edge != candidate.edge;
+                let may_pass = point.edge.is_some() && candidate.edge.is_some();
+                if shift <= LARGEST_SHIFT && (!is_other || may_pass) {
+                    pairs.push((is_other, shift, k, first + j));
                 }
             }
         }
-        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        pairs.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
         let mut taken = vec![false; memory.points.len()];
-        for (_, k, j) in pairs {
+        for (_, _, k, j) in pairs {
             if partner[k].is_none() && !taken[j] {
                 partner[k] = Some(j);
                 taken[j] = true;
@@ -309,8 +311,8 @@ impl SeenChain<'_> {
         let off_chord = |i: usize| (places[i] - first - (last - first) * part(i)).norm();
         let sag = REACH[places.len()] * (0..places.len()).map(off_chord).fold(0.0, f64::max);
         let mut edges = self.surface.edges_near([first, last], sag + self.chain.radius * (1.0 + MARGIN));
-        let place = k as f64;
-        let is_near = |point: &&PointMemory| (point.place - place - 0.5).abs() <= 0.5 + LARGEST_SHIFT;
+        let middle = k as f64 + 0.5;
+        let is_near = |point: &&PointMemory| self.chain.shift(point.place, middle) <= 0.5 + LARGEST_SHIFT;
         edges.extend(self.points.iter().filter(is_near).filter_map(|point| point.edge));
         edges.sort_unstable();
         edges.dedup();
@@ -323,7 +325,10 @@ impl SeenChain<'_> {
         let mut found = Vec::new();
         for number in self.edges_of(k) {
             let Some(edge) = self.surface.edge(number) else { continue };
-            let is_beside = |s: f64| edge.is_beside(self.place(k, s));
+            let is_beside = |s: f64| {
+                let place = self.place(k, s);
+                edge.is_beside(place) && self.surface.owns_corner(number, place)
+            };
             let at = |s: f64, place: Place| Candidate { element: k, s, place, edge: Some(number) };
             let minima = self.minima(k, &|y| edge.distance(y).ok());
             let smooth = minima.found().iter().filter(|minimum| minimum.kind != MinimumKind::Kink);

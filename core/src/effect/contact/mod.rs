@@ -15,7 +15,7 @@ mod surface;
 pub use chain::Chain;
 pub use laws::ContactLaws;
 pub use pairs::{BeamPairs, Meeting};
-pub use shown::NodeContact;
+pub use shown::{ContactParty, NodeContact, NodeContacts};
 pub use strand::{ChainNode, ContactStiffness, Strand};
 pub use surface::{SceneSurface, SurfaceCarrier};
 
@@ -123,8 +123,9 @@ impl SurfaceContacts {
     /// True if no chain touches, or touched, and none has friction, which follows nodes that do not
     /// touch: there is nothing to remember.
     fn is_clear(&self, at: &State) -> bool {
-        let is_clear = |number: usize| !self.laws[self.chains[number].contact].rubs() && !self.is_near(number, at);
-        self.pairs.is_empty() && !at.contacts.touches() && (0..self.chains.len()).all(is_clear)
+        let is_clear =
+            |chain: &Chain| !self.laws[chain.contact].rubs() && chain.is_far(&self.surfaces[chain.surface], at);
+        self.pairs.is_empty() && !at.contacts.touches() && self.chains.iter().all(is_clear)
     }
 
     /// Writes a new memory of all chains.
@@ -596,7 +597,8 @@ impl Contacts for SurfaceContacts {
     }
 
     fn accept(&self, before: &State, at: &mut State) {
-        if self.is_clear(at) && at.contacts.damping_power == 0.0 {
+        at.contacts.is_clear = self.is_clear(at);
+        if at.contacts.is_clear && at.contacts.damping_power == 0.0 {
             at.contacts.factor = at.contacts.first_factor;
             return;
         }
@@ -711,6 +713,9 @@ impl Contacts for SurfaceContacts {
 
     fn energy(&self, at: &State) -> f64 {
         let mut energy = 0.0;
+        if at.contacts.is_clear {
+            return energy;
+        }
         if at.contacts.regime == ContactRegime::Augmented {
             // The memory holds the tractions of the state.
             for (number, chain) in self.chains.iter().enumerate() {

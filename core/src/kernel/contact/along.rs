@@ -183,8 +183,9 @@ pub fn minima<const N: usize>(nodes: &[Vec3; N], distance: &dyn Fn(Vec3) -> Opti
 
 #[cfg(test)]
 mod tests {
+    use super::super::distance::Side;
     use super::super::dual::{Dual, Random};
-    use super::super::surface::{Shape, Side, Surface};
+    use super::super::surface::{Shape, Surface};
     use super::*;
     use std::array::from_fn;
 

@@ -7,6 +7,15 @@ use crate::tensor::{Mat3, Vec3};
 /// its direction would exceed 1e-7 rad.
 pub(super) const MIN_RELATIVE_DISTANCE: f64 = 1e-9;
 
+/// The side of a surface on which beams are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Beams are outside of the body
+    Outside,
+    /// Beams are inside, as a wire in a tube
+    Inside,
+}
+
 /// The part of a surface that is closest to a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feature {
@@ -71,4 +80,25 @@ pub(super) fn sphere<T: Real>(d: Vec3<T>, radius: f64) -> Result<Distance<T>, Un
         curvature: (Mat3::identity() - n.outer(n)) * inverse,
         feature: Feature::End,
     })
+}
+
+/// The distance of the point `y` from a plane.
+pub(super) fn plane<T: Real>(y: Vec3<T>, point: Vec3, normal: Vec3) -> Distance<T> {
+    let normal = Vec3::constant(normal);
+    let value = normal.dot(y - Vec3::constant(point));
+    Distance { value, normal, curvature: Mat3::zero(), feature: Feature::Face }
+}
+
+/// The distance from a cylinder, for the place `d` of the point from a point of its axis.
+pub(super) fn cylinder<T: Real>(d: Vec3<T>, axis: Vec3, radius: f64) -> Result<Distance<T>, Undefined> {
+    let e = Vec3::constant(axis);
+    let q = d - e * e.dot(d);
+    let l = q.norm();
+    if l.largest() <= MIN_RELATIVE_DISTANCE * radius {
+        return Err(Undefined::Axis);
+    }
+    let inverse = T::one() / l;
+    let n = q * inverse;
+    let t = e.cross(n);
+    Ok(Distance { value: l - T::constant(radius), normal: n, curvature: t.outer(t) * inverse, feature: Feature::Face })
 }

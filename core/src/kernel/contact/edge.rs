@@ -10,11 +10,10 @@
 //! ```
 //!
 //! Beside the edge this is the distance from the box ([`super::surface`]); over its faces it is
-//! larger. A beam at a corner touches up to three edges there: the energy of each is a continuous
-//! function of the motion, also where the closest point passes from an edge to a corner.
+//! larger. Of the edges that meet at a corner one touches what is nearest to the corner.
 
-use super::distance::{Distance, Feature, Undefined, sphere};
-use super::surface::{Shape, Side, Surface, cylinder};
+use super::distance::{Distance, Feature, Side, Undefined, cylinder, sphere};
+use super::surface::{Shape, Surface};
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 
@@ -48,6 +47,37 @@ impl Surface {
             | Shape::Cone(_)
             | Shape::Torus { .. }
             | Shape::Tube(_) => false,
+        }
+    }
+
+    /// False where the closest point of an edge to `y` is a corner that another edge has: one of which
+    /// the closest point is between its ends, or the one with the smallest number.
+    pub fn owns_corner(&self, number: u32, y: Vec3) -> bool {
+        let Some(edge) = self.edge(number) else { return true };
+        let along = edge.along.dot(y - edge.middle);
+        if along.abs() < edge.half {
+            return true;
+        }
+        let has_it = |(other, end): (u32, f64)| {
+            let Some(edge) = self.edge(other).filter(|_| other != number) else { return false };
+            let along = edge.along.dot(y - edge.middle);
+            along.abs() < edge.half || (other < number && along * end > 0.0)
+        };
+        !self.edges_at_end(number, along.signum()).into_iter().any(has_it)
+    }
+
+    /// Numbers of the edges that meet at the end of an edge, each with the end of it that is there:
+    /// 1 or -1 along it.
+    fn edges_at_end(&self, number: u32, end: f64) -> Vec<(u32, f64)> {
+        match &self.shape {
+            Shape::Mesh(mesh) => mesh.edges_at_end(number, end, self.side),
+            Shape::Box { .. } => edges_at_corner_of_box(number, end),
+            Shape::Plane { .. }
+            | Shape::Sphere { .. }
+            | Shape::Cylinder { .. }
+            | Shape::Cone(_)
+            | Shape::Torus { .. }
+            | Shape::Tube(_) => Vec::new(),
         }
     }
 
@@ -87,6 +117,20 @@ impl Surface {
             | Shape::Tube(_) => None,
         }
     }
+}
+
+/// The edges of a box at an end of one of them.
+fn edges_at_corner_of_box(number: u32, end: f64) -> Vec<(u32, f64)> {
+    let along = (number / 4) as usize;
+    let mut signs = [end; 3];
+    for (bit, axis) in [(1, (along + 1) % 3), (2, (along + 2) % 3)] {
+        signs[axis] = if number & bit == 0 { 1.0 } else { -1.0 };
+    }
+    let edge = |axis: usize| {
+        let bit = |axis: usize, bit: u32| if signs[axis % 3] > 0.0 { 0 } else { bit };
+        (4 * axis as u32 + bit(axis + 1, 1) + bit(axis + 2, 2), signs[axis])
+    };
+    (0..3).map(edge).collect()
 }
 
 fn edge_of_box(centre: Vec3, axes: &Mat3, half: [f64; 3], number: u32) -> Edge {

@@ -12,10 +12,9 @@
 //! Points whose closest point lies exactly on the border of a face, as on a diagonal of a flat side,
 //! belong to the face.
 
-use super::distance::{Distance, Feature, Undefined, sphere};
+use super::distance::{Distance, Feature, Side, Undefined, cylinder, plane, sphere};
 use super::mesh_parts::{Bend, MeshEdge, MeshError, Parts};
 use super::mesh_tree::{Tree, from_line};
-use super::surface::{Side, cylinder, plane};
 use crate::scalar::Real;
 use crate::tensor::Vec3;
 
@@ -48,6 +47,14 @@ pub struct TriangleMesh {
     /// The diagonal of the box around it
     size: f64,
     depth: f64,
+}
+
+/// The bend of edges that protrude to a side.
+fn protruding_to(side: Side) -> Bend {
+    match side {
+        Side::Outside => Bend::Convex,
+        Side::Inside => Bend::Reflex,
+    }
 }
 
 /// A part of a mesh.
@@ -87,16 +94,6 @@ impl TriangleMesh {
     /// The number of triangles.
     pub fn face_count(&self) -> usize {
         self.parts.faces.len()
-    }
-
-    /// Places of the vertices, in the axes of the carrier.
-    pub fn places(&self) -> &[Vec3] {
-        &self.parts.places
-    }
-
-    /// Numbers of the corners of each triangle.
-    pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
-        self.parts.faces.iter().map(|face| face.corners)
     }
 
     /// Half of the smallest thickness of its walls.
@@ -217,10 +214,7 @@ impl TriangleMesh {
     /// Numbers of the edges that protrude to a side, within `reach` of the line between two points;
     /// and some that are farther.
     pub(super) fn edges_near(&self, line: [Vec3; 2], reach: f64, side: Side) -> Vec<u32> {
-        let protrudes = match side {
-            Side::Outside => Bend::Convex,
-            Side::Inside => Bend::Reflex,
-        };
+        let protrudes = protruding_to(side);
         let mut found = Vec::new();
         self.tree.near_line(line, reach, &mut |face| {
             for number in self.parts.faces[face as usize].edges {
@@ -234,6 +228,16 @@ impl TriangleMesh {
         });
         found.sort_unstable();
         found
+    }
+
+    /// Numbers of the edges that protrude to a side and meet at the end of an edge, each with the end of
+    /// it that is there: 1 or -1 along it.
+    pub(super) fn edges_at_end(&self, number: u32, end: f64, side: Side) -> Vec<(u32, f64)> {
+        let ends = self.parts.edges[number as usize].ends;
+        let corner = if end > 0.0 { ends[1] } else { ends[0] };
+        let at_corner = self.parts.edges_at(corner).iter().map(|&number| (number, &self.parts.edges[number as usize]));
+        let protruding = at_corner.filter(|(_, edge)| edge.bend == protruding_to(side));
+        protruding.map(|(number, edge)| (number, if edge.ends[1] == corner { 1.0 } else { -1.0 })).collect()
     }
 
     /// The middle of an edge.
@@ -250,13 +254,18 @@ impl TriangleMesh {
 
     /// Its sharp edges, and some of the others, for pictures.
     pub(super) fn outline(&self) -> Vec<[Vec3; 2]> {
-        let step = self.parts.edges.len().div_ceil(MOST_DRAWN).max(1);
-        let is_drawn = |number: usize, edge: &MeshEdge| {
+        let is_sharp = |edge: &&MeshEdge| {
             let [a, b] = edge.faces.map(|face| self.parts.faces[face as usize].normal);
-            a.dot(b) < SHARP || (edge.bend != Bend::Flat && number.is_multiple_of(step))
+            a.dot(b) < SHARP
         };
-        let edges = self.parts.edges.iter().enumerate().filter(|(number, edge)| is_drawn(*number, edge));
-        edges.map(|(_, edge)| edge.ends.map(|end| self.parts.place(end))).take(2 * MOST_DRAWN).collect()
+        let (sharp, others): (Vec<&MeshEdge>, Vec<&MeshEdge>) = self.parts.edges.iter().partition(is_sharp);
+        let bent: Vec<&MeshEdge> = others.into_iter().filter(|edge| edge.bend != Bend::Flat).collect();
+        let some = |edges: Vec<&MeshEdge>| {
+            let step = edges.len().div_ceil(MOST_DRAWN).max(1);
+            let places = |edge: &MeshEdge| edge.ends.map(|end| self.parts.place(end));
+            edges.into_iter().step_by(step).map(places).collect::<Vec<_>>()
+        };
+        [some(sharp), some(bent)].concat()
     }
 
     /// The smallest thickness of walls, measured at faces spread over the mesh; `otherwise` if none of

@@ -27,9 +27,14 @@ pub enum MeshError {
     Branched([Vec3; 2]),
     /// A triangle, by its number, has the opposite orientation of a neighbour; the edge between them
     Turned(usize, [Vec3; 2]),
+    /// Two triangles at an edge between these places lie on one another
+    Folded([Vec3; 2]),
     /// All triangles have their normals inward
     InsideOut,
 }
+
+/// Faces lie on one another if the cosine between their normals is below this.
+const FOLDED: f64 = -1.0 + 1e-9;
 
 /// The bend of the surface at an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -175,6 +180,10 @@ fn edges(places: &[Vec3], faces: &mut [Face]) -> Result<Vec<MeshEdge>, MeshError
             return Err(MeshError::Open(edge.ends.map(|corner| places[corner as usize])));
         }
         edge.bend = bend(edge, faces);
+        let [first, second] = edge.faces.map(|face| faces[face as usize].normal);
+        if first.dot(second) < FOLDED {
+            return Err(MeshError::Folded(edge.ends.map(|corner| places[corner as usize])));
+        }
     }
     Ok(edges)
 }

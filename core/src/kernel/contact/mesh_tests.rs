@@ -3,7 +3,7 @@
 use super::along::ShapeAt;
 use super::dual::{Random, jacobian, variables};
 use super::mesh_parts::MeshError;
-use super::{Shape, Side, Surface, TriangleMesh};
+use super::{Feature, Shape, Side, Surface, TriangleMesh};
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
@@ -219,9 +219,42 @@ fn what_bounds_no_body_is_refused() {
     let mut broken = vertices.clone();
     broken[2].0[1] = f64::NAN;
     assert_eq!(refused(&broken, &triangles), MeshError::NotFinite(2));
+    // A side divided about a point in it, and about a point beyond its border.
+    let mut divided = vertices.clone();
+    divided.push(Vec3([-1.0, 0.9, 0.0]));
+    let mut folded: Vec<[u32; 3]> = triangles[2..].to_vec();
+    folded.extend([[8, 0, 4], [8, 4, 6], [8, 6, 2], [8, 2, 0]]);
+    assert!(TriangleMesh::new(divided.clone(), &folded).is_ok());
+    divided[8] = Vec3([-1.0, 1.1, 0.0]);
+    assert!(matches!(refused(&divided, &folded), MeshError::Folded(_)));
     let mut fin = triangles.clone();
     fin.push([0, 4, 7]);
     assert!(matches!(refused(&vertices, &fin), MeshError::Branched(_) | MeshError::Turned(..)));
+}
+
+/// Of the edges that meet at a corner one touches what is nearest to the corner.
+#[test]
+fn a_corner_belongs_to_one_edge() {
+    let mut random = Random(37);
+    let (centre, axes, half) = cuboid(&mut random);
+    let exact = Surface { shape: Shape::Box { centre, axes, half }, side: Side::Outside };
+    let mesh = surface(box_mesh(centre, axes, half), Side::Outside);
+    let mut corners = 0;
+    for _ in 0..2000 {
+        let y = random.vector(1.6);
+        for surface in [&exact, &mesh] {
+            let nearest = surface.distance(y).unwrap();
+            let owns = |number: &u32| {
+                let distance = surface.edge(*number).unwrap().distance(y).unwrap().value;
+                (distance - nearest.value).abs() < 1e-13 && surface.owns_corner(*number, y)
+            };
+            let count = surface.edges_near([y, y], 10.0).iter().filter(|number| owns(number)).count();
+            let expected = usize::from(nearest.feature != Feature::Face);
+            assert_eq!(count, expected, "{y:?} {nearest:?}");
+            corners += usize::from(nearest.feature == Feature::Corner);
+        }
+    }
+    assert!(corners > 100, "{corners}");
 }
 
 /// The time of a distance, told.

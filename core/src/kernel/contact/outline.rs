@@ -7,6 +7,9 @@ use std::f64::consts::PI;
 /// Pieces of a circle.
 const CIRCLE: usize = 32;
 
+/// Circles along a tube, about.
+const MOST_SECTIONS: usize = 200;
+
 /// Circles or straight lines in one direction along a surface.
 const LINES: usize = 8;
 
@@ -29,7 +32,13 @@ impl Surface {
             }
             Shape::Torus { centre, axis, ring, radius } => torus(*centre, *axis, *ring, *radius),
             Shape::Box { centre, axes, half } => cuboid(*centre, axes, *half),
-            Shape::Tube(tube) => pipe(&tube.sections()),
+            Shape::Tube(tube) => {
+                let sections = tube.sections();
+                let step = sections.len().div_ceil(MOST_SECTIONS).max(1);
+                let last = sections[sections.len() - 1];
+                let some = sections.into_iter().step_by(step).chain((step > 1).then_some(last));
+                pipe(&some.collect::<Vec<_>>())
+            }
             Shape::Mesh(mesh) => mesh.outline().into_iter().map(Vec::from).collect(),
         }
     }
@@ -130,7 +139,8 @@ fn pipe(sections: &[(Vec3, f64)]) -> Vec<Vec<Vec3>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::surface::{Side, tests::shapes};
+    use super::super::distance::Side;
+    use super::super::surface::tests::shapes;
     use super::*;
 
     /// Points of all lines lie on the surface; those at the ends of cones and straight tubes may lie

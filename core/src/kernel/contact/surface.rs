@@ -27,21 +27,12 @@
 //! a normal.
 
 use super::cone::Cone;
-use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, Undefined, sphere};
+use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, Side, Undefined, cylinder, plane, sphere};
 use super::mesh::TriangleMesh;
 use super::tube::Tube;
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
-
-/// The side of a surface on which beams are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// Beams are outside of the body
-    Outside,
-    /// Beams are inside, as a wire in a tube
-    Inside,
-}
 
 /// The shape of a rigid surface, in the axes of its carrier. Directions are unit vectors, radii and
 /// half lengths positive.
@@ -157,27 +148,6 @@ impl Shape {
             Self::Mesh(mesh) => mesh.depth(),
         }
     }
-}
-
-/// The distance of the point `y` from a plane.
-pub(super) fn plane<T: Real>(y: Vec3<T>, point: Vec3, normal: Vec3) -> Distance<T> {
-    let normal = Vec3::constant(normal);
-    let value = normal.dot(y - Vec3::constant(point));
-    Distance { value, normal, curvature: Mat3::zero(), feature: Feature::Face }
-}
-
-/// The distance from a cylinder, for the place `d` of the point from a point of its axis.
-pub(super) fn cylinder<T: Real>(d: Vec3<T>, axis: Vec3, radius: f64) -> Result<Distance<T>, Undefined> {
-    let e = Vec3::constant(axis);
-    let q = d - e * e.dot(d);
-    let l = q.norm();
-    if l.largest() <= MIN_RELATIVE_DISTANCE * radius {
-        return Err(Undefined::Axis);
-    }
-    let inverse = T::one() / l;
-    let n = q * inverse;
-    let t = e.cross(n);
-    Ok(Distance { value: l - T::constant(radius), normal: n, curvature: t.outer(t) * inverse, feature: Feature::Face })
 }
 
 fn torus<T: Real>(d: Vec3<T>, axis: Vec3, ring: f64, radius: f64) -> Result<Distance<T>, Undefined> {

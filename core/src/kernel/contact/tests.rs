@@ -1,11 +1,12 @@
 //! Contact points against dual numbers, balance of forces and moments, objectivity, symmetry.
 
 use super::along::{MinimumKind, ShapeAt, minima, slopes, weighted_sum};
+use super::distance::Side;
 use super::dual::{Dual, Errors, Random, along, size, tangent_error};
 use super::friction::{CarriedTraction, FrictionLaw, Status};
 use super::law::NormalLaw;
 use super::point::{Carrier, ContactLaw, Place, PointState, add_point};
-use super::surface::{Side, Surface, tests::shapes};
+use super::surface::{Surface, tests::shapes};
 use super::variation::{ContactNode, NodeBefore};
 use crate::kernel::element::{ElementSystem, Weights};
 use crate::rotation::Rotation;
