@@ -104,7 +104,7 @@ fn parts(elements: usize, dynamic: bool, interpolation: &str) {
     let residual = quickest(|| {
         black_box(system.residual(&b, &x, &mut room));
     });
-    let convergence = Convergence { tolerance: 1e-8 };
+    let convergence = Convergence { tolerance: 1e-8, negligible: 0.0 };
     let judge = quickest(|| {
         black_box(convergence.judge(&model, system, RoundOff::default(), None));
     });

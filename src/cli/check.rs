@@ -1,5 +1,6 @@
 //! `beamsim check`
 
+use super::accuracy::study_error;
 use super::error::CommandError;
 use super::load::Loaded;
 use super::status::Status;
@@ -8,6 +9,7 @@ use super::verdict::Verdict;
 use super::{console, json, load};
 use crate::scene::{self, Mesh, Scene};
 use crate::study::forecast::{Forecast, forecast};
+use crate::study::{accuracy, cost};
 use beamsim_core::model::beam_element::{ElementGeometry, Rule};
 use beamsim_core::model::{Assembly, EffectSize, Schedule, SectionMatrices};
 use beamsim_core::run::{Failure, Moment, refusal};
@@ -36,6 +38,10 @@ fn one(path: &Path, settings: &[String]) -> Result<(), CommandError> {
     let begun = Instant::now();
     let loaded = load::deck(path, settings)?;
     let reading = begun.elapsed();
+    let Loaded { deck, scene, .. } = &loaded;
+    accuracy::refuse_outputs(deck, scene)
+        .and_then(|()| cost::refuse_outputs(deck, scene))
+        .map_err(|found| study_error(found.into(), path, &loaded))?;
     let title = loaded.scene.title.as_deref().unwrap_or("(no title)");
     console::line(&format!("{}: {title}", path.display()));
     print_computed_sections(&loaded);

@@ -136,7 +136,10 @@ impl ResultFolder {
     pub fn commit(&self, names: &[&str], record: &mut Record) -> Result<(), OutputError> {
         record.files = names.iter().map(|name| self.listed(name)).collect::<Result<_, _>>()?;
         self.write_over(RECORD, record.to_string().as_bytes())?;
-        sync(&self.path);
+        // Where no files of a run before are removed, a crash leaves new ones, or none.
+        if tables().chain([RECORD]).any(|name| fs::symlink_metadata(self.path.join(name)).is_ok()) {
+            sync(&self.path);
+        }
         give_names(&self.path, record)
     }
 

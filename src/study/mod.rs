@@ -10,6 +10,7 @@ mod error;
 pub mod error_bars;
 pub mod forecast;
 mod outcome;
+mod outputs;
 mod parallel;
 mod scale;
 mod strains;

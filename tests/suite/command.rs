@@ -206,6 +206,53 @@ fn negative_numbers_are_values_of_options() {
     assert!(status(&same) == 0 && String::from_utf8_lossy(&same.stdout).contains("NaN in both histories"));
 }
 
+/// A ball that falls on the ground: its contact has columns that change in jumps.
+const FALLING: &str = r#"
+gravity = [0, 0, -9.81]
+[point]
+ball = [0, 0, 0.2]
+[[body]]
+at = "ball"
+mass = 1
+inertia = [0.01, 0.01, 0.01]
+[[surface]]
+name = "ground"
+kind = "plane"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+[[contact]]
+name = "fall"
+nodes = ["ball"]
+surfaces = ["ground"]
+radius = 0.1
+stiffness = 1e4
+[output]
+columns = ["x", "contact"]
+[[stage]]
+kind = "dynamic"
+end = 0.2
+step = 1e-3
+"#;
+
+#[test]
+fn outputs_that_jump_are_refused_before_a_run_and_by_check() {
+    let folder = Folder::new("jumps");
+    folder.write("good.toml", FALLING);
+    assert_eq!(status(&folder.beamsim(&["check", "good.toml"])), 0);
+    folder.write("accuracy.toml", &format!("accuracy = {{ \"fall.points\" = 1e-3 }}\n{FALLING}"));
+    folder.write("cost.toml", &format!("{FALLING}[cost]\noutputs = [\"ball.z\", \"fall.points\"]\n"));
+    for (command, deck) in
+        [("run", "accuracy.toml"), ("check", "accuracy.toml"), ("cost", "cost.toml"), ("check", "cost.toml")]
+    {
+        let output = folder.beamsim(&[command, deck]);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(status(&output), 2, "{command} {deck}: {told}");
+        assert!(told.contains("`fall.points` changes in jumps"), "{command} {deck}: {told}");
+    }
+    // Other commands do not look at [cost].
+    assert_eq!(status(&folder.beamsim(&["run", "cost.toml"])), 0);
+}
+
 #[test]
 fn check_tells_what_would_be_simulated() {
     let folder = Folder::new("check");
@@ -619,7 +666,9 @@ fn the_lines_of_a_study_of_a_motion_give_their_errors_again() {
         let settings: Vec<&str> =
             run["settings"].split(' ').filter(|s| !s.is_empty()).flat_map(|s| ["--set", s]).collect();
         let vary = [format!("order={}", run["order"]), format!("interpolation={}", run["interpolation"])];
-        let one = ["--vary", &vary[0], "--vary", &vary[1], "--vary", "elements=1", "--vary", "step=1"];
+        let scheme = if run["settings"].contains("lobatto") { "scheme=lobatto" } else { "scheme=newmark" };
+        let one =
+            ["--vary", &vary[0], "--vary", &vary[1], "--vary", "elements=1", "--vary", "step=1", "--vary", scheme];
         let again = cost(&[&settings[..], &one].concat(), "one");
         assert_eq!((again.len(), &again[0]["error"]), (1, &run["error"]), "{}", run["settings"]);
         assert_eq!(again[0]["iterations"], run["iterations"]);

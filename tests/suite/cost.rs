@@ -91,7 +91,7 @@ fn orders_in_space_are_twice_those_of_elements() {
 
 #[test]
 fn steps_cost_accuracy_of_the_second_order_and_are_told_where_they_limit() {
-    let text = format!("{SWINGING}[cost]\norder = [2, 3]\ninterpolation = \"relative\"\n");
+    let text = format!("{SWINGING}[cost]\norder = [2, 3]\ninterpolation = \"relative\"\nscheme = \"newmark\"\n");
     let found = costs(&text, &Against::Finest, 2);
     for orders in &found.orders {
         let time = orders.time.unwrap();
@@ -103,6 +103,23 @@ fn steps_cost_accuracy_of_the_second_order_and_are_told_where_they_limit() {
     // The cheapest run of all has the longest step, and the most accurate one the shortest.
     let best = frontier().min_by(|a, b| a.error.total_cmp(&b.error)).unwrap();
     assert_eq!(best.variant.pace, Pace::Steps(0.25));
+}
+
+/// Lobatto's scheme is tried where the deck has the default scheme, and errs less at the same step.
+#[test]
+fn a_study_tries_the_scheme_of_order_four() {
+    let found = costs(&format!("{SWINGING}[cost]\norder = 3\nelements = 1\n"), &Against::Finest, 2);
+    let is_lobatto = |scheme: Option<SchemeName>| scheme == Some(SchemeName::Lobatto);
+    let of_lobatto = found.orders.iter().find(|orders| is_lobatto(orders.family.scheme)).unwrap();
+    assert_eq!(of_lobatto.time.unwrap().expected, Some(Expected { order: 4.0, at_least: false }));
+    let longest = |of: bool| {
+        let mut runs = found.runs.iter().filter(|run| is_lobatto(run.variant.family.scheme) == of);
+        runs.find(|run| run.variant.pace == Pace::Steps(2.0)).unwrap().error
+    };
+    assert!(longest(true) < 0.2 * longest(false), "{:e} {:e}", longest(true), longest(false));
+    let damped = SWINGING.replace("step = 0.01", "step = 0.01\nscheme = \"generalized_alpha\"");
+    let found = costs(&format!("{damped}[cost]\norder = 1\nelements = 1\n"), &Against::Finest, 2);
+    assert!(found.runs.iter().all(|run| !is_lobatto(run.variant.family.scheme)));
 }
 
 /// What must be the same whenever a study is made.
@@ -293,7 +310,9 @@ fn reached(text: &str, wanted: &Accuracy) -> Result<Found, StudyError> {
 fn error_with(text: &str, found: &Found, against: &Against) -> f64 {
     let (family, pasted) = (&found.variant.family, deck::apply(text, &found.settings()).unwrap());
     let (order, word) = (family.order.unwrap(), family.interpolation.unwrap().word());
-    let step = if matches!(found.variant.pace, Pace::Steps(_)) { "step = 1\n" } else { "" };
+    let scheme = family.scheme.unwrap_or(SchemeName::Newmark).word();
+    let is_dynamic = matches!(found.variant.pace, Pace::Steps(_));
+    let step = if is_dynamic { format!("step = 1\nscheme = \"{scheme}\"\n") } else { String::new() };
     let alone = format!("{pasted}[cost]\nelements = 1\norder = {order}\ninterpolation = \"{word}\"\n{step}");
     let study = costs(&alone, against, 2);
     assert_eq!(study.runs.len(), 1);

@@ -99,7 +99,9 @@ pub(super) fn newton_for(stage: &Stage, assembly: &Assembly, model: &Model, at: 
     let Some(solver) = LinearSolver::new(&assembly.system, &model.multipliers) else {
         return Err(at.limit("not enough memory for the factorisation of the tangent"));
     };
-    let convergence = Convergence { tolerance: stage.tolerance };
+    // Forces of bodies that fly freely fall from step to step, until products with them underflow.
+    let negligible = if stage.work.kind().advances_time() { f64::MIN_POSITIVE } else { 0.0 };
+    let convergence = Convergence { tolerance: stage.tolerance, negligible };
     Ok(Newton::new(convergence, stage.max_iterations, solver, &assembly.system))
 }
 

@@ -69,7 +69,7 @@ impl StageRun<'_> {
         self.assembly.forget();
         let round_off = self.assembly.round_off(self.state);
         self.assembly.evaluate(self.state, Weights::NONE, None);
-        let loose = Convergence { tolerance: LOOSE_BALANCE };
+        let loose = Convergence { tolerance: LOOSE_BALANCE, negligible: 0.0 };
         let verdict = loose.judge(self.model, &self.assembly.system, round_off, None).verdict;
         if !matches!(verdict, Verdict::Converged | Verdict::Noisy) {
             let message = "the modal or buckling stage does not start from an equilibrium: put a static stage before \

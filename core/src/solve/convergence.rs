@@ -16,6 +16,8 @@ use crate::threads;
 pub struct Convergence {
     /// Largest residual relative to the largest force, see [`Convergence`]
     pub tolerance: f64,
+    /// Residual forces (and moments) up to this are none
+    pub negligible: f64,
 }
 
 /// Correction below which the iteration ends: displacements relative to the length of the scene,
@@ -112,6 +114,7 @@ impl Convergence {
                 SlotKind::Displacement | SlotKind::Sliding => tolerated.max(ROUND_OFF_FACTOR * round_off.force),
                 SlotKind::Rotation => tolerated.max(ROUND_OFF_FACTOR * round_off.moment),
             };
+            let allowed = allowed.max(self.negligible);
             worst.noisy |= peak.size > tolerated;
             let ratio = if peak.size == 0.0 { 0.0 } else { peak.size / allowed };
             if ratio > worst.ratio {

@@ -448,8 +448,11 @@ impl<'a> ModeSearch<'a> {
             Complex::new(dot(&re, &of_re) + dot(&im, &of_im), dot(&re, &of_im) - dot(&im, &of_re))
         };
         let mass = form(&self.matrices.mass);
-        let terms =
-            [mass * exponent * exponent, form(&self.matrices.damping) * exponent, form(&self.matrices.stiffness)];
+        let damping = match self.form {
+            ProblemForm::Symmetric | ProblemForm::Undamped => Complex::default(),
+            ProblemForm::Gyroscopic | ProblemForm::General => form(&self.matrices.damping),
+        };
+        let terms = [mass * exponent * exponent, damping * exponent, form(&self.matrices.stiffness)];
         // The larger part of the vector determines the round-off.
         let of_part = if dot(&re, &re) >= dot(&im, &im) { &re } else { &im };
         let uncertainty = lost_part(self.system, of_part);

@@ -5,8 +5,9 @@ use crate::study::cost::{Sampler, Samples};
 use crate::study::scale::mesh_error;
 use beamsim_core::probe::MeshError;
 
-/// The orders of the error over the step.
-const TIME_ORDERS: Orders = Orders { assumed: 1.5, smooth: 2.0 };
+/// The order of the error over the step that is assumed, of any scheme: vibrations that steps do not
+/// resolve err by second order.
+const ASSUMED_TIME_ORDER: f64 = 1.5;
 
 /// Orders of the error over a width.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +76,7 @@ pub fn divisors_in_space(ratio: f64, order: usize, columns: &[String], between: 
 
 /// The difference to a run with other steps over this is the error.
 pub fn divisor_in_time(ratio: f64) -> f64 {
-    (ratio.powf(TIME_ORDERS.assumed) - 1.0).abs()
+    (ratio.powf(ASSUMED_TIME_ORDER) - 1.0).abs()
 }
 
 /// A source of errors.
@@ -83,8 +84,8 @@ pub fn divisor_in_time(ratio: f64) -> f64 {
 pub enum Source {
     /// The mesh, of elements of an order
     Mesh(usize),
-    /// The steps
-    Steps,
+    /// The steps, of a scheme of an order
+    Steps(f64),
 }
 
 impl Source {
@@ -92,7 +93,7 @@ impl Source {
     fn orders(self, falls: Falls) -> Orders {
         match self {
             Self::Mesh(order) => falls.in_space(order),
-            Self::Steps => TIME_ORDERS,
+            Self::Steps(order) => Orders { assumed: ASSUMED_TIME_ORDER, smooth: order },
         }
     }
 }

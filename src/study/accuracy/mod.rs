@@ -26,8 +26,8 @@ pub(super) use estimate::{divisor_in_time, divisors_in_space, left_by_newton};
 
 use super::StudyError;
 use super::change::Change;
-use super::cost::{Family, Mesher, Original, Pace, Patience, Pool, Sampler, StudyOptions, Variant};
-use super::scale::jumps;
+use super::cost::{Family, Mesher, Original, Pace, Patience, Pool, Sampler, StudyOptions, Variant, may_take_lobatto};
+use super::outputs;
 use crate::deck::{Accuracy, Beam, Deck, Diagnostic, InterpolationWord, StageBody};
 use crate::scene::Scene;
 use crate::study::Outcome;
@@ -132,7 +132,7 @@ pub fn reach(
 ) -> Result<Found, StudyError> {
     let original = Original { text, deck };
     let pace = first_pace(deck);
-    let sampler = Sampler::of_histories(deck, scene, outputs(wanted, scene)?, coarser(pace));
+    let sampler = Sampler::of_histories(deck, scene, outputs_of(wanted, scene)?, coarser(pace));
     let own: Vec<Vec<usize>> = deck.beams.iter().map(Beam::element_counts).collect();
     let mut mesher = Mesher {
         original,
@@ -156,7 +156,7 @@ pub fn reach(
     let pool = Pool::new(original, &sampler, options)
         .with_patience(|variant| if has_long_steps(variant) { Patience::SHORT } else { Patience::LONG })
         .with_outcomes();
-    Search::new(wanted, mesher, family, pace, newton).run(pool)
+    Search::new(wanted, mesher, family, pace, newton).with_lobatto(may_take_lobatto(deck, scene)).run(pool)
 }
 
 /// True if the steps are longer than those of the deck. Such a variant may fail without harm: the
@@ -195,16 +195,21 @@ fn first_pace(deck: &Deck) -> Pace {
     Pace::Steps(factor.min(FIRST_STEP))
 }
 
-/// The numbers of the columns of which an accuracy is wanted: all that have one, if none are named.
-fn outputs(wanted: &Accuracy, scene: &Scene) -> Result<Vec<usize>, StudyError> {
+/// Refuses a deck whose `accuracy` names columns that have no error, or has no outputs with one.
+pub fn refuse_outputs(deck: &Deck, scene: &Scene) -> Result<(), Diagnostic> {
+    deck.accuracy.as_ref().map_or(Ok(()), |wanted| outputs_of(wanted, scene).map(|_| ()))
+}
+
+/// The numbers of the columns of which an accuracy is wanted: all that have an error, if none are
+/// named.
+fn outputs_of(wanted: &Accuracy, scene: &Scene) -> Result<Vec<usize>, Diagnostic> {
     let columns = super::outcome::columns(scene);
-    for name in wanted.columns() {
-        let column = super::outcome::find_column(&columns, name)?;
-        if jumps(&columns[column]) {
-            let message = format!("`{}` changes in jumps: no error of it can be estimated", name.value);
-            return Err(Diagnostic::error(message, name.span.clone()).into());
+    match wanted {
+        Accuracy::All(_) => outputs::all(&columns),
+        Accuracy::Columns(_) => {
+            outputs::named(&columns, wanted.columns())?;
+            // A name may stand for the columns of several stages.
+            Ok((0..columns.len()).filter(|&k| wanted.of(&columns[k]).is_finite()).collect())
         }
     }
-    let has_bound = |column: &String| wanted.of(column).is_finite() && !jumps(column);
-    Ok((0..columns.len()).filter(|&k| has_bound(&columns[k])).collect())
 }

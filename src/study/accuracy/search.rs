@@ -5,9 +5,9 @@ use super::estimate::{ErrorShare, Fall, Outputs, Pair, Source, left_by_newton};
 use super::indicator::{self, PlacedMesh};
 use super::round::{Compared, Round, Trials};
 use super::{CUBIC, Found, Meshes, coarser, has_long_steps, scaled};
-use crate::deck::{Accuracy, Beam, Stage, StageBody};
+use crate::deck::{Accuracy, Beam, SchemeName, Stage, StageBody};
 use crate::study::StudyError;
-use crate::study::cost::{Companion, Family, Mesher, Pace, Placement, Pool, Trial, Variant};
+use crate::study::cost::{Companion, Family, Mesher, Pace, Placement, Pool, Trial, Variant, order_in_time};
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 use std::sync::Arc;
@@ -26,9 +26,14 @@ const MESH_SHRINKS: [f64; 2] = [0.8, 0.25];
 /// The largest number of halvings of a step from round to round.
 const MOST_HALVINGS: f64 = 3.0;
 
-/// The order with which steps are planned. A step that is too long costs little, since the next
-/// round compares with it.
-const PLANNED_ORDER: f64 = 2.0;
+/// The lowest order of a scheme with which steps are planned. A step that is too long costs little,
+/// since the next round compares with it.
+const LOWEST_ORDER: f64 = 2.0;
+
+/// The error of steps over the allowed one from which on Lobatto's scheme with the same step is
+/// tried: shorter steps of second order would be six times as many, and one of its steps takes as
+/// long as three.
+const WORTH_LOBATTO: f64 = 40.0;
 
 /// The planned error over the allowed one.
 const AIM: f64 = 0.9;
@@ -89,6 +94,8 @@ pub struct Search<'a> {
     mesh: f64,
     pace: Pace,
     longest: Pace,
+    /// True if Lobatto's scheme may be tried, and has not been
+    may_take_lobatto: bool,
     in_space: KnownShares<Mesh>,
     in_time: KnownShares<Pace>,
     /// A variant with more work is not tried.
@@ -144,7 +151,25 @@ impl<'a> Search<'a> {
         let coarse = pace == Pace::Timeless && wanted.least() >= CUBIC;
         let mesh = if coarse { COARSE_MESH } else { FIRST_MESH };
         let most_work = f64::INFINITY;
-        Self { wanted, mesher, family, newton, mesh, pace, longest: pace, in_space, in_time, most_work }
+        let may_take_lobatto = false;
+        Self {
+            wanted,
+            mesher,
+            family,
+            newton,
+            mesh,
+            pace,
+            longest: pace,
+            may_take_lobatto,
+            in_space,
+            in_time,
+            most_work,
+        }
+    }
+
+    /// The search with Lobatto's scheme among its means if `allowed`.
+    pub fn with_lobatto(self, allowed: bool) -> Self {
+        Self { may_take_lobatto: allowed, ..self }
     }
 
     /// Runs rounds until the wanted accuracy is reached, with equal elements (or the shape of the
@@ -375,6 +400,7 @@ impl<'a> Search<'a> {
 
     fn estimates(&mut self, round: &Round, trials: &Trials) -> Estimates {
         if !trials.own.finished() {
+            self.leave_lobatto();
             let unknown = || ErrorShare::unknown(self.mesher.sampler.columns.len());
             self.in_space.last = vec![(self.mesh_of(&round.own), unknown())];
             self.in_time.last = vec![(self.pace, unknown())];
@@ -387,6 +413,7 @@ impl<'a> Search<'a> {
 
     fn share_of_steps(&mut self, round: &Round, trials: &Trials) -> ErrorShare {
         let own = &trials.own;
+        let order = self.order_in_time();
         let width = round.own.step(self.mesher.original.deck).unwrap_or(1.0);
         let share = match &round.longer {
             Some(Compared { ratio, .. }) => {
@@ -395,7 +422,7 @@ impl<'a> Search<'a> {
                 let none = vec![false; self.mesher.sampler.columns.len()];
                 let outputs = Outputs { sampler: self.mesher.sampler, wanted: self.wanted, between: &none };
                 let pair = longer.and_then(|longer| pair(own, longer, width, *ratio));
-                share(&mut self.in_time.fall, Source::Steps, pair, &outputs)
+                share(&mut self.in_time.fall, Source::Steps(order), pair, &outputs)
             }
             None => self.in_time.known(&self.pace, round.own.width()).unwrap_or_else(|| self.none()),
         };
@@ -500,17 +527,38 @@ impl<'a> Search<'a> {
 
     fn change_step(&mut self, over: f64, other_changes: bool) {
         let Pace::Steps(factor) = self.pace else { return };
-        if over > 1.0 {
-            let order = self.in_time.fall.low_order().unwrap_or(PLANNED_ORDER);
+        if over > WORTH_LOBATTO && over.is_finite() && self.may_take_lobatto {
+            self.may_take_lobatto = false;
+            self.set_scheme(Some(SchemeName::Lobatto));
+        } else if over > 1.0 {
+            let order = self.in_time.fall.low_order().unwrap_or(self.order_in_time());
             let halvings = if over.is_finite() { over.log2() / order } else { 1.0 };
             self.pace = Pace::Steps(factor * 0.5_f64.powf(halvings.round().clamp(1.0, MOST_HALVINGS)));
         } else if other_changes
             && over.is_finite()
-            && over * 2.0_f64.powf(2.0 * PLANNED_ORDER) < 1.0
+            && over * 2.0_f64.powf(2.0 * self.order_in_time()) < 1.0
             && self.pace != self.longest
         {
             self.pace = coarser(self.pace);
         }
+    }
+
+    /// The order of the errors of steps, for smooth solutions.
+    fn order_in_time(&self) -> f64 {
+        let expected = order_in_time(self.mesher.original.deck, &self.family);
+        expected.map_or(LOWEST_ORDER, |expected| expected.order.max(LOWEST_ORDER))
+    }
+
+    /// Goes back to the scheme of the deck, where a run with Lobatto's has failed.
+    fn leave_lobatto(&mut self) {
+        if self.family.scheme.is_some() {
+            self.set_scheme(None);
+        }
+    }
+
+    fn set_scheme(&mut self, scheme: Option<SchemeName>) {
+        self.family.scheme = scheme;
+        self.in_time = KnownShares::new();
     }
 }
 

@@ -2,8 +2,9 @@
 //! on several meshes and with several steps.
 
 use super::mesher::Mesher;
-use super::variant::{Family, Pace, Variant, dynamic_stages};
-use crate::deck::{Cost, Deck, InterpolationWord, StageBody};
+use super::variant::{Family, Pace, Variant, dynamic_stages, may_take_lobatto};
+use crate::deck::{Cost, Deck, InterpolationWord, SchemeName, StageBody};
+use crate::scene::Scene;
 
 /// Orders, unless the deck names some.
 const ORDERS: [usize; 3] = [1, 2, 3];
@@ -29,8 +30,9 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The variants that [cost] of the deck asks for, with defaults for the rest.
-    pub fn of(deck: &Deck) -> Self {
+    /// The variants that [cost] of the deck asks for, with defaults for the rest: the scheme of the
+    /// deck, and where it suits, Lobatto's with one interpolation.
+    pub fn of(deck: &Deck, scene: &Scene) -> Self {
         let Cost { elements, order, interpolation, scheme, step, step_tolerance, .. } = deck.cost.clone();
         let bent = !deck.beams.is_empty();
         let dynamic = dynamic_stages(deck).next().is_some();
@@ -40,16 +42,22 @@ impl Grid {
         let words = interpolation.unwrap_or(INTERPOLATIONS.to_vec());
         let words = if bent { words.into_iter().map(Some).collect() } else { vec![None] };
         let schemes = scheme.filter(|_| dynamic).map_or(vec![None], |list| list.into_iter().map(Some).collect());
+        let paces = paces(deck, step, step_tolerance);
         let mut families = Vec::new();
-        for scheme in schemes {
+        for &scheme in &schemes {
             for &interpolation in &words {
                 families.extend(orders.iter().map(|&order| Family { order, interpolation, scheme }));
             }
         }
+        let chooses_scheme = schemes == [None] && matches!(paces[0], Pace::Steps(_));
+        if chooses_scheme && may_take_lobatto(deck, scene) {
+            let scheme = Some(SchemeName::Lobatto);
+            families.extend(orders.iter().map(|&order| Family { order, interpolation: words[0], scheme }));
+        }
         let usual = if dynamic { ELEMENTS_DYNAMIC.to_vec() } else { ELEMENTS_STATIC.to_vec() };
         let mut meshes = if bent { elements.unwrap_or(usual) } else { vec![1.0] };
         meshes.sort_by(f64::total_cmp);
-        Self { families, meshes, paces: paces(deck, step, step_tolerance) }
+        Self { families, meshes, paces }
     }
 
     /// Every variant once, by family, mesh and pace; two coarse meshes may be the same after

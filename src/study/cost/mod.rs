@@ -29,14 +29,14 @@ pub(in crate::study) use mesher::{Companion, Mesher};
 pub(in crate::study) use placement::{PlacedPiece, Placement};
 pub(in crate::study) use pool::Pool;
 pub(in crate::study) use sample::{Sampler, Samples};
-pub(in crate::study) use variant::{Original, dynamic_stages};
+pub(in crate::study) use variant::{Original, dynamic_stages, may_take_lobatto, order_in_time};
 
 use crate::deck::{Deck, Diagnostic, InterpolationWord, NormWord, StageBody};
 use crate::output::HistoryReader;
 use crate::scene::Scene;
 use crate::study::StudyError;
-use crate::study::outcome::{Outcome, StageClock, columns, find_column};
-use crate::study::scale::jumps;
+use crate::study::outcome::{Outcome, StageClock, columns};
+use crate::study::outputs;
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 use grid::Grid;
@@ -93,7 +93,7 @@ pub fn study(
     options: StudyOptions,
 ) -> Result<CostStudy, StudyError> {
     let original = Original { text, deck };
-    let grid = Grid::of(deck);
+    let grid = Grid::of(deck, scene);
     let (sampler, given) = sampler(deck, scene, &grid, against)?;
     let mut pool = Pool::new(original, &sampler, options);
 
@@ -164,7 +164,7 @@ fn sampler(
     grid: &Grid,
     against: &Against,
 ) -> Result<(Sampler, Option<Reference>), Diagnostic> {
-    let outputs = outputs(deck, scene)?;
+    let outputs = outputs_of(deck, scene)?;
     let (mut sampler, samples, made) = match against {
         Against::Finest => return Ok((Sampler::of_rows(deck, scene, outputs, grid.paces[0]), None)),
         Against::Table(table) => {
@@ -218,12 +218,18 @@ fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
 }
 
 /// The numbers of the columns whose error counts: all that have one, if none are named.
-fn outputs(deck: &Deck, scene: &Scene) -> Result<Vec<usize>, Diagnostic> {
+fn outputs_of(deck: &Deck, scene: &Scene) -> Result<Vec<usize>, Diagnostic> {
     let columns = columns(scene);
-    let Some(names) = &deck.cost.outputs else {
-        return Ok((0..columns.len()).filter(|&k| !jumps(&columns[k])).collect());
-    };
-    names.iter().map(|name| find_column(&columns, name)).collect()
+    match &deck.cost.outputs {
+        Some(names) => outputs::named(&columns, names),
+        None => outputs::all(&columns),
+    }
+}
+
+/// Refuses a deck whose `[cost]` names outputs that have no error.
+pub fn refuse_outputs(deck: &Deck, scene: &Scene) -> Result<(), Diagnostic> {
+    let is_named = deck.cost.outputs.is_some();
+    if is_named { outputs_of(deck, scene).map(|_| ()) } else { Ok(()) }
 }
 
 /// Orders of all families: in space with the finest pace, in time on the finest mesh.

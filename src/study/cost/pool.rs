@@ -3,7 +3,7 @@
 use super::frontier;
 use super::run::{CostRun, StudyOptions, Timing};
 use super::sample::Sampler;
-use super::trial::{self, Patience, Seconds, Trial};
+use super::trial::{self, Kept, Patience, Seconds, Trial};
 use super::variant::{Original, Variant};
 use crate::study::StudyError;
 use crate::study::change::Change;
@@ -104,8 +104,9 @@ impl<'a, 'o> Pool<'a, 'o> {
     pub fn strains(&self, variant: &Variant) -> Result<Option<StrainRecord>, StudyError> {
         let changes = variant.changes(self.original);
         let signals = self.options.interrupted;
+        let patience = (self.patience)(variant);
         let (_, outcome) =
-            trial::run(self.original.deck, &changes, self.sampler, (self.patience)(variant), true, &signals);
+            trial::run(self.original.deck, &changes, self.sampler, patience, Kept::OutputsAndStrains, &signals);
         match signals() {
             Some(signal) => Err(StudyError::Failure(interrupted(signal))),
             None => Ok(outcome.filter(|outcome| outcome.ended.is_ok()).and_then(|outcome| outcome.strains)),
@@ -152,8 +153,9 @@ impl<'a, 'o> Pool<'a, 'o> {
         let signals = self.options.interrupted;
         let stopped = || signals().or_else(|| deadline.is_over().then_some(0));
         let keeps = self.outcomes.is_some();
+        let kept = if keeps { Kept::OutputsAndStrains } else { Kept::Outputs };
         let run = |k: usize| {
-            let (trial, outcome) = trial::run(deck, &changes[k], sampler, patience(&variants[k]), keeps, &stopped);
+            let (trial, outcome) = trial::run(deck, &changes[k], sampler, patience(&variants[k]), kept, &stopped);
             let outcome = outcome.filter(|outcome| keeps && trial.finished() && outcome.size() < KEPT_NUMBERS);
             (!trial.failed_as(FailureKind::Interrupted)).then_some((trial, outcome))
         };
@@ -204,8 +206,9 @@ impl<'a, 'o> Pool<'a, 'o> {
                 if self.deadline.is_over() || (round >= REPEATS[0] && spent > TIMED_SECONDS) {
                     continue;
                 }
+                let signals = self.options.interrupted;
                 let (trial, _) =
-                    trial::run(deck, &runs[k].changes, self.sampler, Patience::LONG, false, &self.options.interrupted);
+                    trial::run(deck, &runs[k].changes, self.sampler, Patience::LONG, Kept::Outputs, &signals);
                 if let Some(signal) = (self.options.interrupted)() {
                     return Err(StudyError::Failure(interrupted(signal)));
                 }

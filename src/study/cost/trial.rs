@@ -78,20 +78,28 @@ impl Trial {
     }
 }
 
-/// Runs a deck with changes. Gives the trial, and all outputs where there is such a scene, also with
-/// `strains` along its beams if these are wanted.
+/// Numbers that a run keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kept {
+    /// Outputs
+    Outputs,
+    /// Outputs, and strains along beams
+    OutputsAndStrains,
+}
+
+/// Runs a deck with changes. Gives the trial, and all numbers to keep where there is such a scene.
 /// `interrupted` gives the signal that was caught.
 pub fn run(
     deck: &Deck,
     changes: &[Change],
     sampler: &Sampler,
     patience: Patience,
-    strains: bool,
+    kept: Kept,
     interrupted: &dyn Fn() -> Option<i32>,
 ) -> (Trial, Option<Outcome>) {
     let cpu = ThreadTime::try_now().ok();
     let wall = Instant::now();
-    let outcome = simulate_with(deck, changes, sampler, patience, strains, interrupted);
+    let outcome = simulate_with(deck, changes, sampler, patience, kept, interrupted);
     let wall = wall.elapsed().as_secs_f64();
     // Systems without CPU times of threads have the wall-clock time instead.
     let cpu = cpu.and_then(|start| start.try_elapsed().ok()).map_or(wall, |time| time.as_secs_f64());
@@ -126,7 +134,7 @@ pub fn simulate(
     patience: Patience,
     interrupted: &dyn Fn() -> Option<i32>,
 ) -> Result<Outcome, StudyError> {
-    simulate_with(deck, changes, sampler, patience, false, interrupted)
+    simulate_with(deck, changes, sampler, patience, Kept::Outputs, interrupted)
 }
 
 fn simulate_with(
@@ -134,11 +142,14 @@ fn simulate_with(
     changes: &[Change],
     sampler: &Sampler,
     patience: Patience,
-    strains: bool,
+    kept: Kept,
     interrupted: &dyn Fn() -> Option<i32>,
 ) -> Result<Outcome, StudyError> {
     let built = build(deck, changes, sampler)?;
-    let strains = if strains { StrainRecord::of(&built) } else { None };
+    let strains = match kept {
+        Kept::Outputs => None,
+        Kept::OutputsAndStrains => StrainRecord::of(&built),
+    };
     let BuiltDeck { deck, scene } = &built;
     Ok(Outcome::with_strains(scene, sampler.recorder(scene), strains, attempts(deck, patience), interrupted))
 }

@@ -3,8 +3,13 @@
 use super::order::Expected;
 use super::placement::Placement;
 use crate::deck::{Beam, Deck, Division, InterpolationWord, SchemeName, SchemeWord, StageBody, Words};
+use crate::scene::Scene;
+use crate::study::built::BuiltDeck;
 use crate::study::change::Change;
 use std::sync::Arc;
+
+/// The work of a step of Lobatto's scheme over that of a step of the Newmark family.
+const LOBATTO_WORK: f64 = 3.0;
 
 /// A deck that a study varies.
 #[derive(Clone, Copy)]
@@ -130,7 +135,8 @@ impl Variant {
             Pace::Steps(factor) => 1.0 / factor,
             Pace::Adapts(tolerance) => tolerance.powf(-1.0 / 3.0),
         };
-        (4.0 + elements as f64 * order * order) * paces
+        let of_scheme = if self.family.scheme == Some(SchemeName::Lobatto) { LOBATTO_WORK } else { 1.0 };
+        (4.0 + elements as f64 * order * order) * paces * of_scheme
     }
 
     /// The changes that make this variant of a deck; none where it is the deck itself.
@@ -207,8 +213,30 @@ impl Variant {
     }
 }
 
+/// True if Lobatto's scheme may take the place of the scheme of a deck: that is the trapezoidal rule,
+/// its sister of second order, and there are neither contacts, whose forces have kinks, nor
+/// multipliers, which need dissipation.
+pub(in crate::study) fn may_take_lobatto(deck: &Deck, scene: &Scene) -> bool {
+    let is_trapezoidal = |body: StageBody| match body {
+        StageBody::Dynamic { scheme: SchemeWord::Newmark(beta, gamma), .. } => beta == 0.25 && gamma == 0.5,
+        StageBody::Dynamic { .. }
+        | StageBody::Static { .. }
+        | StageBody::Path { .. }
+        | StageBody::Modal { .. }
+        | StageBody::Buckling { .. } => false,
+    };
+    let model = &scene.plan.model;
+    let stages: Vec<(usize, StageBody)> = dynamic_stages(deck).collect();
+    let suits = !stages.is_empty()
+        && stages.iter().all(|&(_, body)| is_trapezoidal(body))
+        && model.multipliers.is_empty()
+        && model.contacts().is_none();
+    let change = |&(stage, _): &(usize, StageBody)| Change::Scheme { stage, name: SchemeName::Lobatto };
+    suits && BuiltDeck::changed(deck, &stages.iter().map(change).collect::<Vec<_>>()).is_ok()
+}
+
 /// The order of the scheme of a family's dynamic stages; `None` where they differ.
-pub(super) fn order_in_time(deck: &Deck, family: &Family) -> Option<Expected> {
+pub(in crate::study) fn order_in_time(deck: &Deck, family: &Family) -> Option<Expected> {
     let of_stage = |(_, body)| match body {
         // A change of scheme is to its usual coefficients.
         StageBody::Dynamic { scheme: SchemeWord::Newmark(_, gamma), .. } if family.scheme.is_none() && gamma != 0.5 => {
