@@ -17,6 +17,7 @@ mod manual;
 mod new;
 mod outputs;
 mod plot;
+mod plot_profile;
 mod progress;
 mod report;
 mod restart;

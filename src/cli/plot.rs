@@ -1,9 +1,9 @@
-//! `beamsim plot`
+//! `beamsim plot`: histories; profiles along beams are in `plot_profile.rs`.
 
 use super::error::CommandError;
 use super::status::Status;
 use super::verdict::Verdict;
-use super::{console, json, load, outputs};
+use super::{console, json, load, outputs, plot_profile};
 use crate::deck::nearest;
 use crate::output::{
     Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, OutputKind, PartFile, Record, Scale, Units, quantity_of,
@@ -21,24 +21,31 @@ const MIN_CHANGE: f64 = 1e-9;
 /// Arguments of `beamsim plot`.
 #[derive(clap::Args)]
 pub struct PlotArguments {
-    /// Folders of results, or histories (CSV); several are drawn on the same axes
+    /// Folders of results, or histories (CSV); several are drawn on the same axes. Or a profile.csv:
+    /// resultants and stresses along beams
     #[arg(required = true, value_name = "RESULTS")]
     results: Vec<PathBuf>,
     /// A column, such as tip.ux; may be repeated (default: the first six displacements that change;
     /// without displacements, the first six columns)
     #[arg(long = "column", value_name = "COLUMN")]
-    columns: Vec<String>,
+    pub columns: Vec<String>,
+    /// Of a profile, a beam; may be repeated (default: all beams)
+    #[arg(long = "beam", value_name = "BEAM")]
+    pub beams: Vec<String>,
+    /// Of a profile, the stage at whose end it is drawn (default: the last one)
+    #[arg(long, value_name = "STAGE")]
+    pub stage: Option<usize>,
     /// The column of the horizontal axis (default: time; if no stage is dynamic, the load factor,
     /// one stage after another)
     #[arg(long, value_name = "COLUMN")]
-    x: Option<String>,
+    pub x: Option<String>,
     /// A stored history (CSV) to compare with
     #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
+    pub reference: Option<PathBuf>,
     /// The picture, .svg or (in builds with `--features png`) .png (default: plot.svg in the first
     /// folder)
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
 }
 
 /// A history with its name in the legend.
@@ -81,6 +88,15 @@ pub fn plot(wanted: &PlotArguments) -> Status {
 }
 
 fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
+    if let Some(profile) = plot_profile::profile_of(&wanted.results)? {
+        return plot_profile::draw(wanted, profile);
+    }
+    for (option, is_given) in [("--beam", !wanted.beams.is_empty()), ("--stage", wanted.stage.is_some())] {
+        if is_given {
+            let message = format!("`{option}` is for profiles along beams: give results/NAME/profile.csv");
+            return Err(CommandError::Usage(message));
+        }
+    }
     let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
     let format = Format::of(&path)?;
     outputs::check_file(&path, format.kind())?;
@@ -217,14 +233,16 @@ fn stage_by_stage(stages: &[f64], loads: &[f64]) -> Vec<f64> {
 
 /// Formats of plots.
 #[derive(Clone, Copy)]
-enum Format {
+pub enum Format {
+    /// Vectors
     Svg,
+    /// Pixels
     Png,
 }
 
 impl Format {
     /// The format that the name of a file asks for.
-    fn of(path: &Path) -> Result<Self, CommandError> {
+    pub fn of(path: &Path) -> Result<Self, CommandError> {
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             None | Some("svg") => Ok(Self::Svg),
@@ -236,7 +254,8 @@ impl Format {
         }
     }
 
-    fn kind(self) -> OutputKind {
+    /// The kind of its files.
+    pub fn kind(self) -> OutputKind {
         match self {
             Self::Svg => OutputKind::Svg,
             Self::Png => OutputKind::Png,
@@ -244,7 +263,7 @@ impl Format {
     }
 
     /// A plot in this format.
-    fn draw(self, plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
+    pub fn draw(self, plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
         match self {
             Self::Svg => Ok(plot.to_svg().into_bytes()),
             Self::Png => png(plot),
