@@ -16,6 +16,7 @@ mod load;
 mod manual;
 mod new;
 mod outputs;
+mod picture;
 mod plot;
 mod plot_profile;
 mod progress;
@@ -135,7 +136,7 @@ enum Command {
     )]
     Plot {
         #[command(flatten)]
-        wanted: plot::PlotArguments,
+        wanted: picture::PlotArguments,
     },
     /// Show the properties of sections (stiffness, mass, centres), and draw those that are computed from
     /// their shape

@@ -1,7 +1,7 @@
 //! `beamsim plot results/NAME/profile.csv`: diagrams of resultants and stresses along beams.
 
 use super::error::CommandError;
-use super::plot::{Format, PlotArguments};
+use super::picture::{Format, PlotArguments};
 use super::{console, json, load, outputs};
 use crate::deck::nearest;
 use crate::output::{Axis, Line, LinePlot, LineStyle, PartFile, ProfileReader, Record, Scale, Units, quantity_of};

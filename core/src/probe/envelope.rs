@@ -1,9 +1,8 @@
 //! The largest stresses over the time of a run, at places along beams.
 
-use super::largest_row::{LargestRow, Row};
+use super::largest_row::{Extreme, LargestRow, Row};
 use super::place::StressPlace;
-use crate::run::{Moment, Snapshot};
-use crate::section::Point;
+use crate::run::Snapshot;
 use crate::section::recovery::Criterion;
 use serde::{Deserialize, Serialize};
 
@@ -27,21 +26,6 @@ pub struct Extremes {
     pub von_mises: Option<Extreme>,
     /// Largest failure index, in sections with strengths
     pub index: Option<Extreme>,
-}
-
-/// The largest value so far, with when and where it was.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-pub struct Extreme {
-    /// The value
-    pub value: f64,
-    /// When
-    pub moment: Moment,
-    /// Coordinates 2 and 3 of the shape
-    pub at: Point,
-    /// Index of the region
-    pub region: usize,
-    /// N1 N2 N3 M1 M2 M3 then
-    pub resultant: [f64; 6],
 }
 
 impl Envelope {

@@ -7,11 +7,10 @@
 //! is likely to be the largest is looked at first, and excludes most others: if stress grows in every
 //! row, nearly all of a batch.
 
-use super::envelope::Extreme;
 use crate::run::Moment;
-use crate::section::Vector6;
 use crate::section::recovery::{Criterion, PlacedRecovery};
 use crate::section::unit_peaks::UnitPeaks;
+use crate::section::{Point, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// Rows that wait, at most
@@ -19,6 +18,21 @@ const BATCH: usize = 128;
 
 /// The part of a value that is round-off
 const ROUND_OFF: f64 = 1e-12;
+
+/// The largest value so far, with when and where it was.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Extreme {
+    /// The value
+    pub value: f64,
+    /// When
+    pub moment: Moment,
+    /// Coordinates 2 and 3 of the shape
+    pub at: Point,
+    /// Index of the region
+    pub region: usize,
+    /// N1 N2 N3 M1 M2 M3 then
+    pub resultant: [f64; 6],
+}
 
 /// The largest row so far, and rows that may be larger.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -246,6 +260,32 @@ mod tests {
                     let load = section.in_section(&Vector6::from(found.resultant));
                     let again = section.section().largest_of(criterion, &load, f64::NEG_INFINITY);
                     assert_eq!(again.expect("a value").value, found.value);
+                }
+            }
+        }
+    }
+
+    /// Prints the nanoseconds of a row by section and course.
+    #[test]
+    #[ignore = "a study"]
+    fn costs_of_rows() {
+        const ROWS: usize = 10_000;
+        for (number, section) in sections().iter().enumerate() {
+            for (kind, course) in courses().into_iter().enumerate() {
+                let rows: Vec<[f64; 6]> = (0..ROWS)
+                    .map(|row| std::array::from_fn(|k| course(400 * row / ROWS, k) * (1.0 + row as f64 * 1e-5)))
+                    .collect();
+                for criterion in [Criterion::VonMises, Criterion::FailureIndex] {
+                    section.section().unit_peaks(criterion);
+                    let start = std::time::Instant::now();
+                    let mut largest = LargestRow::default();
+                    for (row, &resultant) in rows.iter().enumerate() {
+                        let moment = Moment { stage: 1, time: row as f64, load: 1.0 };
+                        largest.row(section, criterion, Row { moment, resultant });
+                    }
+                    let found = largest.found(section, criterion).expect("a row");
+                    let cost = start.elapsed().as_nanos() / ROWS as u128;
+                    println!("section {number} course {kind} {criterion:?}: {cost} ns a row, {:.4}", found.value);
                 }
             }
         }
