@@ -247,7 +247,7 @@ fn run(aim: f64, tolerance: impl Fn(&Value) -> f64) {
             shown(stress.corners),
             shown(peak_error(&case, &analysis, &materials)),
         );
-        let [corner_tolerance, tolerance_of_stress] = if aim < 1e-4 { [2e-2, 5e-3] } else { [6e-2, 1e-2] };
+        let [corner_tolerance, tolerance_of_stress] = if aim < 1e-4 { [2e-2, 5e-3] } else { [3e-2, 1e-2] };
         let peak = peak_error(&case, &analysis, &materials).unwrap_or(0.0);
         let size = analysis.solution.area.sqrt();
         let near = |key: &str, found: [f64; 2]| {
