@@ -25,6 +25,15 @@ pub enum From {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
+    /// The blade of a turbine of windIO 1 (IEA Wind Task 37): reference axis, twist, 6x6 matrices
+    Windio {
+        /// Turbine in YAML
+        #[arg(value_name = "FILE")]
+        input: PathBuf,
+        /// File of the deck (default: the name of the turbine file with `.toml`, here)
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
     /// Beams of an input file of Abaqus or CalculiX: *BEAM SECTION, nodes, supports, loads
     Abaqus {
         /// Input file
@@ -41,6 +50,7 @@ pub fn import(from: &From) -> Status {
     let mut verdict = Verdict::default();
     let (read, source, out) = match from {
         From::Beamdyn { primary, driver, out } => (beamdyn(primary, driver.as_deref()), primary, out),
+        From::Windio { input, out } => (windio(input), input, out),
         From::Abaqus { input, out } => (abaqus(input), input, out),
     };
     let done = read.and_then(|imported| {
@@ -70,7 +80,12 @@ fn beamdyn(primary: &Path, driver: Option<&Path>) -> Result<Imported, CommandErr
         }
     };
     let blade = import::read_blade(&primary.display().to_string(), &text, beside).map_err(refuse)?;
-    Ok(import::beamdyn_deck(&blade, driver.as_ref()))
+    Ok(import::blade_deck(&blade, driver.as_ref()))
+}
+
+fn windio(input: &Path) -> Result<Imported, CommandError> {
+    let blade = import::read_windio(&input.display().to_string(), &read(input)?).map_err(refuse)?;
+    Ok(import::blade_deck(&blade, None))
 }
 
 fn abaqus(input: &Path) -> Result<Imported, CommandError> {

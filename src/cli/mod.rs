@@ -16,7 +16,9 @@ mod load;
 mod manual;
 mod new;
 mod outputs;
+mod picture;
 mod plot;
+mod plot_profile;
 mod progress;
 mod report;
 mod restart;
@@ -134,7 +136,7 @@ enum Command {
     )]
     Plot {
         #[command(flatten)]
-        wanted: plot::PlotArguments,
+        wanted: picture::PlotArguments,
     },
     /// Show the properties of sections (stiffness, mass, centres), and draw those that are computed from
     /// their shape

@@ -1,12 +1,13 @@
-//! `beamsim plot`
+//! `beamsim plot`: histories; profiles along beams are in `plot_profile.rs`.
 
 use super::error::CommandError;
+use super::picture::{Format, PlotArguments};
 use super::status::Status;
 use super::verdict::Verdict;
-use super::{console, json, load, outputs};
+use super::{console, json, load, outputs, plot_profile};
 use crate::deck::nearest;
 use crate::output::{
-    Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, OutputKind, PartFile, Record, Scale, Units, quantity_of,
+    Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, PartFile, Record, Scale, Units, quantity_of,
 };
 use beamsim_core::probe::{Quantity, clocks, quantity};
 use std::path::{Path, PathBuf};
@@ -17,29 +18,6 @@ const MAX_DEFAULT_COLUMNS: usize = 6;
 const MAX_NAMED_COLUMNS: usize = 8;
 /// Smallest change of a displacement relative to the largest one; smaller changes are round-off.
 const MIN_CHANGE: f64 = 1e-9;
-
-/// Arguments of `beamsim plot`.
-#[derive(clap::Args)]
-pub struct PlotArguments {
-    /// Folders of results, or histories (CSV); several are drawn on the same axes
-    #[arg(required = true, value_name = "RESULTS")]
-    results: Vec<PathBuf>,
-    /// A column, such as tip.ux; may be repeated (default: the first six displacements that change;
-    /// without displacements, the first six columns)
-    #[arg(long = "column", value_name = "COLUMN")]
-    columns: Vec<String>,
-    /// The column of the horizontal axis (default: time; if no stage is dynamic, the load factor,
-    /// one stage after another)
-    #[arg(long, value_name = "COLUMN")]
-    x: Option<String>,
-    /// A stored history (CSV) to compare with
-    #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
-    /// The picture, .svg or (in builds with `--features png`) .png (default: plot.svg in the first
-    /// folder)
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-}
 
 /// A history with its name in the legend.
 struct NamedHistory {
@@ -81,6 +59,15 @@ pub fn plot(wanted: &PlotArguments) -> Status {
 }
 
 fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
+    if let Some(profile) = plot_profile::profile_of(&wanted.results)? {
+        return plot_profile::draw(wanted, profile);
+    }
+    for (option, is_given) in [("--beam", !wanted.beams.is_empty()), ("--stage", wanted.stage.is_some())] {
+        if is_given {
+            let message = format!("`{option}` is for profiles along beams: give results/NAME/profile.csv");
+            return Err(CommandError::Usage(message));
+        }
+    }
     let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
     let format = Format::of(&path)?;
     outputs::check_file(&path, format.kind())?;
@@ -213,55 +200,6 @@ fn stage_by_stage(stages: &[f64], loads: &[f64]) -> Vec<f64> {
         start += high - low;
     }
     values
-}
-
-/// Formats of plots.
-#[derive(Clone, Copy)]
-enum Format {
-    Svg,
-    Png,
-}
-
-impl Format {
-    /// The format that the name of a file asks for.
-    fn of(path: &Path) -> Result<Self, CommandError> {
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        match extension.as_deref() {
-            None | Some("svg") => Ok(Self::Svg),
-            Some("png") => Ok(Self::Png),
-            Some(other) => {
-                let message = format!("unknown file type `.{other}`: plots are written as .svg or .png");
-                Err(CommandError::Usage(message))
-            }
-        }
-    }
-
-    fn kind(self) -> OutputKind {
-        match self {
-            Self::Svg => OutputKind::Svg,
-            Self::Png => OutputKind::Png,
-        }
-    }
-
-    /// A plot in this format.
-    fn draw(self, plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
-        match self {
-            Self::Svg => Ok(plot.to_svg().into_bytes()),
-            Self::Png => png(plot),
-        }
-    }
-}
-
-#[cfg(feature = "png")]
-fn png(plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
-    plot.to_png().map_err(|why| CommandError::Usage(format!("the plot cannot be drawn: {why}")))
-}
-
-#[cfg(not(feature = "png"))]
-fn png(_plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
-    let message =
-        "this build writes .svg only; for .png, install it by `cargo install --path . --locked --features png`";
-    Err(CommandError::Usage(message.into()))
 }
 
 /// The history in a folder, or the file itself.

@@ -94,7 +94,6 @@ pub fn pictures<'a>(
     units: &Units,
     digits: impl Fn(f64) -> String,
 ) -> Result<Vec<(String, SectionPicture<'a>)>, CommandError> {
-    let mesh = &solution.analysis.mesh;
     let field = solution.analysis.stresses(&solution.materials);
     let field = field.map_err(|error| CommandError::Usage(format!("section `{}`: {error}", section.name)))?;
     let unit = units.label(STRESS_UNIT).map_or(String::new(), |unit| format!(" {unit}"));
@@ -104,12 +103,12 @@ pub fn pictures<'a>(
         let one = if loads.is_given { "" } else { " = 1" };
         let picture = SectionPicture {
             title: format!("section {}: von Mises stress under {name}{one}", section.name),
-            mesh,
+            mesh: &field.mesh,
             materials: Vec::new(),
             points: Vec::new(),
             warping: None,
             stress: Some(StressShade {
-                of_elements: field.of_elements(&section.field_load(load), von_mises),
+                of_elements: field.nodal.of_elements(&section.field_load(load), von_mises),
                 largest,
                 legend: format!("{}{unit}", digits(largest)),
             }),

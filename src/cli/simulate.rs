@@ -5,8 +5,8 @@ use super::console;
 use super::progress::Progress;
 use super::signals;
 use crate::output::{
-    DeckSource, FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, PROFILE, ReachedAccuracy,
-    Record, ResultFolder, Row, RowCounter, Rows, STRESS, SavedRun, SideColumns, Units, write_envelope, write_profile,
+    DeckSource, FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, ReachedAccuracy, Record,
+    ResultFolder, Row, RowCounter, Rows, SavedRun, SideColumns, Units, write_envelope, write_profile,
 };
 use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
@@ -220,7 +220,7 @@ impl Results {
             fields: self.fields.as_mut().map(FieldsWriter::save).transpose()?,
             reel: film.map(|film| film.reel().clone()),
             bars: self.history.side_columns().map(SideColumns::save),
-            envelope: self.envelope.as_ref().map(|envelope| envelope.found().to_vec()),
+            envelope: self.envelope.as_ref().map(|envelope| envelope.followed().to_vec()),
             profile: self.profile.as_ref().map(|profile| profile.ends().to_vec()),
             run,
         };
@@ -234,7 +234,7 @@ impl Results {
         let history = self.history.complete();
         let is_finished = is_finished && history.is_ok();
         let modes = self.modes.finish(&self.folder).map(|names| self.names.extend(names));
-        let stresses = self.write_stresses(scene);
+        let stresses = self.write_stresses(scene, is_finished && modes.is_ok());
         let is_finished = is_finished && modes.is_ok() && stresses.is_ok();
         let fields = self
             .fields
@@ -244,14 +244,12 @@ impl Results {
     }
 
     /// Writes the tables of stresses and resultants along beams, where they are wanted.
-    fn write_stresses(&mut self, scene: &Scene) -> Result<(), OutputError> {
+    fn write_stresses(&mut self, scene: &Scene, is_finished: bool) -> Result<(), OutputError> {
         if let Some(envelope) = &self.envelope {
-            write_envelope(&self.folder, &scene.mesh, envelope)?;
-            self.names.push(STRESS);
+            self.names.push(write_envelope(&self.folder, &scene.mesh, envelope, is_finished)?);
         }
         if let Some(profile) = &self.profile {
-            write_profile(&self.folder, &scene.mesh, profile)?;
-            self.names.push(PROFILE);
+            self.names.push(write_profile(&self.folder, &scene.mesh, profile, is_finished)?);
         }
         Ok(())
     }

@@ -5,14 +5,14 @@ use super::lines::{ImportError, Lines};
 use nalgebra::Matrix6;
 
 /// Key points and stations, at most.
-const MOST: usize = 100_000;
+pub const MOST: usize = 100_000;
 
 /// Difference of two entries of a matrix that must be equal, relative to the root of the products
 /// of diagonals, that is taken for rounding of printed numbers.
 const ROUNDING: f64 = 1e-3;
 
 /// Rows of matrices of BeamDyn, x y z x y z, in the order of sections here, 1 = z, 2 = x, 3 = y.
-const ORDER: [usize; 6] = [2, 0, 1, 5, 3, 4];
+pub const ORDER: [usize; 6] = [2, 0, 1, 5, 3, 4];
 
 /// A key point of the reference axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,11 +36,22 @@ pub struct BladeStation {
     pub line: usize,
 }
 
-/// A blade of BeamDyn.
+/// Form of the files of a blade.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// Of BeamDyn
+    BeamDyn,
+    /// Of windIO
+    WindIo,
+}
+
+/// A blade in the axes of BeamDyn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Blade {
     /// Second line of the primary file
     pub title: String,
+    /// Form of the files
+    pub origin: Origin,
     /// Name of the primary file
     pub primary: String,
     /// Name of the blade file
@@ -106,6 +117,7 @@ pub fn read_blade(
     let stations = read_stations(&blade_lines)?;
     Ok(Blade {
         title: lines.line(1).trim().to_string(),
+        origin: Origin::BeamDyn,
         primary: name.into(),
         key_points,
         member_ends,
@@ -252,7 +264,7 @@ fn read_matrix(lines: &Lines, at: &mut usize, of: &str) -> Result<Matrix6<f64>, 
 }
 
 /// The mass of a rigid section, without the rounding of printed numbers: [m I, -m d~; m d~, J].
-fn rigid(mass: &Matrix6<f64>) -> Result<Matrix6<f64>, String> {
+pub fn rigid(mass: &Matrix6<f64>) -> Result<Matrix6<f64>, String> {
     let axial = mass[(0, 0)];
     let m = axial + ((mass[(1, 1)] - axial) + (mass[(2, 2)] - axial)) / 3.0;
     let scale = |i: usize, j: usize| ROUNDING * (mass[(i, i)] * mass[(j, j)]).abs().sqrt();

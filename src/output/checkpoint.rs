@@ -8,7 +8,7 @@ use super::folder::CHECKPOINT;
 use super::history::SavedHistory;
 use super::{ModesWriter, OutputError, Reel, ResultFolder, SavedBars, SavedFields};
 use crate::scene::Scene;
-use beamsim_core::probe::{Extremes, StageEnd};
+use beamsim_core::probe::{Followed, StageEnd};
 use beamsim_core::run::Checkpoint;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -52,8 +52,8 @@ pub struct SavedRun<R> {
     pub reel: Option<Reel>,
     /// The error bars so far
     pub bars: Option<SavedBars>,
-    /// The largest stresses so far, where they are followed
-    pub envelope: Option<Vec<Extremes>>,
+    /// Rows with the largest stresses so far, where they are followed
+    pub envelope: Option<Vec<Followed>>,
     /// Resultants at the ends of stages so far, where they are written
     pub profile: Option<Vec<StageEnd>>,
     /// The run

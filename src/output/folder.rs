@@ -19,19 +19,29 @@ const LOCK: &str = ".lock";
 const RECORD: &str = "run.json";
 /// The file of a run that can be resumed.
 pub const CHECKPOINT: &str = "checkpoint";
-/// The table of largest stresses.
-pub const STRESS: &str = "stress.csv";
-/// The table of resultants along beams.
-pub const PROFILE: &str = "profile.csv";
+/// The table of largest stresses of a run that finished, and of one that did not.
+const STRESS: [&str; 2] = ["stress.csv", "stress.partial.csv"];
+/// The table of resultants along beams of a run that finished, and of one that did not.
+const PROFILE: [&str; 2] = ["profile.csv", "profile.partial.csv"];
 /// The tables that a run may write, and their kinds.
-const TABLES: [(&str, OutputKind); 6] = [
+const TABLES: [(&str, OutputKind); 8] = [
     ("history.csv", OutputKind::History),
     ("history.partial.csv", OutputKind::History),
     ("modes.csv", OutputKind::Modes),
     ("buckling.csv", OutputKind::Buckling),
-    (STRESS, OutputKind::Stress),
-    (PROFILE, OutputKind::Profile),
+    (STRESS[0], OutputKind::Stress),
+    (STRESS[1], OutputKind::Stress),
+    (PROFILE[0], OutputKind::Profile),
+    (PROFILE[1], OutputKind::Profile),
 ];
+/// Name of the table of largest stresses.
+pub fn stress_name(is_finished: bool) -> &'static str {
+    STRESS[usize::from(!is_finished)]
+}
+/// Name of the table of resultants along beams.
+pub fn profile_name(is_finished: bool) -> &'static str {
+    PROFILE[usize::from(!is_finished)]
+}
 /// The names of tables.
 fn tables() -> impl Iterator<Item = &'static str> {
     TABLES.into_iter().map(|(name, _)| name)

@@ -12,6 +12,7 @@ pub(crate) mod json;
 mod modes;
 mod ownership;
 mod plot;
+mod profile;
 mod quantities;
 mod record;
 mod report;
@@ -22,13 +23,14 @@ pub use checkpoint::{FoundCheckpoint, SavedRun};
 pub use error::OutputError;
 pub use fields::{FieldsWriter, SavedFields};
 pub use files::{PartFile, remove_dead_parts, remove_fields, remove_if_there};
-pub use folder::{PROFILE, ResultFolder, STRESS, settle};
+pub use folder::{ResultFolder, settle};
 pub use history::{
     HistoryReader, HistoryWriter, Row, RowCounter, Rows, SavedBars, SavedCompanion, SavedHistory, SideColumns,
 };
 pub use modes::ModesWriter;
 pub use ownership::{OutputKind, may_replace, refuse_no_folder};
 pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale, SectionPicture, StressShade};
+pub use profile::{ProfileReader, ProfileRow};
 pub use quantities::{Units, quantity_of};
 pub use record::{
     DeckSource, FileRecord, FinishedRun, ReachedAccuracy, ReachedColumn, ReachedMesh, ReachedMeshes, Record,

@@ -1,6 +1,6 @@
 //! Quantities and units of the columns of a history, for titles and labels.
 
-use beamsim_core::probe::{ColumnPart, Dimension, find_part};
+use beamsim_core::probe::{ColumnPart, Dimension, Quantity, find_part};
 use serde_json::Value;
 
 /// Labels of the units of a deck. Numbers are never converted.
@@ -54,6 +54,11 @@ impl Units {
     /// The unit of forces.
     pub fn force(&self) -> Option<String> {
         self.label(Dimension::FORCE)
+    }
+
+    /// The unit of stresses.
+    pub fn stress(&self) -> Option<String> {
+        self.label(Quantity::Stress.dimension())
     }
 
     /// The unit of moments.

@@ -2,7 +2,7 @@
 //! along all beams at the end of each stage.
 
 use super::cells::harmless;
-use super::folder::{PROFILE, STRESS};
+use super::folder::{profile_name, stress_name};
 use super::{OutputError, ResultFolder};
 use crate::scene::Mesh;
 use beamsim_core::probe::{BeamPoint, Envelope, Extreme, Extremes, Profile, ProfilePlace, StageEnd, StressPlace};
@@ -18,11 +18,17 @@ const EXTREME: [&str; 12] = ["stage", "time", "load", "x2", "x3", "region", "N1"
 /// Resultants
 const RESULTANTS: [&str; 6] = ["N1", "N2", "N3", "M1", "M2", "M3"];
 
-/// Writes the table of largest stresses.
-pub fn write_envelope(folder: &ResultFolder, mesh: &Mesh, envelope: &Envelope) -> Result<(), OutputError> {
+/// Writes the table of largest stresses of a run, as far as it came; gives its name.
+pub fn write_envelope(
+    folder: &ResultFolder,
+    mesh: &Mesh,
+    envelope: &Envelope,
+    is_finished: bool,
+) -> Result<&'static str, OutputError> {
     let mut header: Vec<String> = PLACE.iter().chain(&["section", "vm"]).map(ToString::to_string).collect();
     header.extend(EXTREME.map(String::from));
-    let has_index = envelope.found().iter().any(|found| found.index.is_some());
+    let found = envelope.found();
+    let has_index = found.iter().any(|found| found.index.is_some());
     if has_index {
         header.push("index".into());
         header.extend(EXTREME.map(|name| format!("index.{name}")));
@@ -36,12 +42,17 @@ pub fn write_envelope(folder: &ResultFolder, mesh: &Mesh, envelope: &Envelope) -
         }
         cells
     };
-    let rows = envelope.places().iter().zip(envelope.found()).map(row);
-    write(folder, STRESS, &header, rows)
+    let rows = envelope.places().iter().zip(&found).map(row);
+    write(folder, stress_name(is_finished), &header, rows)
 }
 
-/// Writes the table of resultants.
-pub fn write_profile(folder: &ResultFolder, mesh: &Mesh, profile: &Profile) -> Result<(), OutputError> {
+/// Writes the table of resultants of a run, as far as it came; gives its name.
+pub fn write_profile(
+    folder: &ResultFolder,
+    mesh: &Mesh,
+    profile: &Profile,
+    is_finished: bool,
+) -> Result<&'static str, OutputError> {
     let known = || profile.places().iter().filter_map(|place| place.section.as_ref());
     let has_stress = known().next().is_some();
     let has_index = known().any(|section| section.section().has_strength());
@@ -69,22 +80,23 @@ pub fn write_profile(folder: &ResultFolder, mesh: &Mesh, profile: &Profile) -> R
     let rows = profile.ends().iter().flat_map(|end| {
         profile.places().iter().zip(&end.resultants).map(|(place, resultants)| row(end, place, resultants))
     });
-    write(folder, PROFILE, &header, rows)
+    write(folder, profile_name(is_finished), &header, rows)
 }
 
 fn write<H: AsRef<[u8]>>(
     folder: &ResultFolder,
-    name: &str,
+    name: &'static str,
     header: &[H],
     rows: impl Iterator<Item = Vec<String>>,
-) -> Result<(), OutputError> {
+) -> Result<&'static str, OutputError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(header)?;
     for row in rows {
         writer.write_record(row)?;
     }
     let bytes = writer.into_inner().map_err(|error| OutputError::content(&folder.part(name), error))?;
-    folder.write(name, &bytes)
+    folder.write(name, &bytes)?;
+    Ok(name)
 }
 
 /// Beam, fraction of its length, and length from its start.

@@ -1,6 +1,7 @@
 //! Cubic splines and helices, by arc length.
 
 use beamsim_core::kernel::shape;
+use beamsim_core::kernel::spline::cubics;
 use beamsim_core::tensor::Vec3;
 use std::f64::consts::PI;
 
@@ -140,51 +141,15 @@ fn panel_start(segment: &Segment, panel: usize) -> f64 {
 
 /// The cubics between points whose parameters differ by `chords`.
 fn segments(points: &[Vec3], chords: &[f64], tangents: Option<[Vec3; 2]>) -> Vec<Segment> {
-    let slopes = slopes(points, chords, tangents);
+    let components = [0, 1, 2].map(|axis: usize| {
+        let values: Vec<f64> = points.iter().map(|point| point.0[axis]).collect();
+        cubics(&values, chords, tangents.map(|ends| ends.map(|tangent| tangent.0[axis])))
+    });
     let segment = |(k, &chord): (usize, &f64)| {
-        let rise = (points[k + 1] - points[k]) * (1.0 / chord);
-        let c2 = (rise * 3.0 - slopes[k] * 2.0 - slopes[k + 1]) * (1.0 / chord);
-        let c3 = (slopes[k] + slopes[k + 1] - rise * 2.0) * (1.0 / (chord * chord));
-        Segment { c: [points[k], slopes[k], c2, c3], chord }
+        let c = [0, 1, 2, 3].map(|power: usize| Vec3([0, 1, 2].map(|axis: usize| components[axis][k][power])));
+        Segment { c, chord }
     };
     chords.iter().enumerate().map(segment).collect()
-}
-
-/// The first derivatives at all points, which make the second ones continuous:
-/// h_k m_(k-1) + 2 (h_(k-1) + h_k) m_k + h_(k-1) m_(k+1) = 3 (h_k d_(k-1) + h_(k-1) d_k),
-/// d_k = (x_(k+1) - x_k)/h_k. At an end without tangent 2 m_0 + m_1 = 3 d_0.
-fn slopes(points: &[Vec3], chords: &[f64], tangents: Option<[Vec3; 2]>) -> Vec<Vec3> {
-    let last = points.len() - 1;
-    let rise = |k: usize| (points[k + 1] - points[k]) * (1.0 / chords[k]);
-    // A row [below, diagonal, above] of the tridiagonal matrix, and its right-hand side.
-    let row = |k: usize| match (k, tangents) {
-        (0, Some([tangent, _])) => ([0.0, 1.0, 0.0], tangent),
-        (0, None) => ([0.0, 2.0, 1.0], rise(0) * 3.0),
-        (k, Some([_, tangent])) if k == last => ([0.0, 1.0, 0.0], tangent),
-        (k, None) if k == last => ([1.0, 2.0, 0.0], rise(last - 1) * 3.0),
-        (k, _) => {
-            let before = chords[k - 1];
-            let after = chords[k];
-            let right = rise(k - 1) * (3.0 * after) + rise(k) * (3.0 * before);
-            ([after, 2.0 * (before + after), before], right)
-        }
-    };
-    let mut above = Vec::with_capacity(points.len());
-    let mut slopes: Vec<Vec3> = Vec::with_capacity(points.len());
-    for k in 0..=last {
-        let ([below, diagonal, over], right) = row(k);
-        let (pivot, right) = match k {
-            0 => (diagonal, right),
-            _ => (diagonal - below * above[k - 1], right - slopes[k - 1] * below),
-        };
-        above.push(over / pivot);
-        slopes.push(right * (1.0 / pivot));
-    }
-    for k in (0..last).rev() {
-        let next = slopes[k + 1];
-        slopes[k] -= next * above[k];
-    }
-    slopes
 }
 
 /// A helix: x(t) = centre + radius (cos a e + sin a f) + t advance axis, a = t angle, t from 0 to 1.

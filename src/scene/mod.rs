@@ -369,11 +369,11 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     })
 }
 
-/// True if fields show stresses: those of a deck that asks for stresses.
+/// True if pictures of the whole scene show stresses: those of a deck that asks for stresses.
 fn shows_stress(deck: &Deck) -> bool {
     let output = &deck.output;
     let has_columns = output.columns.iter().flatten().any(|key| key.value == "stress");
-    output.vtk && (has_columns || output.envelope.is_some() || output.profile.is_some())
+    has_columns || output.envelope.is_some() || output.profile.is_some()
 }
 
 /// The coordinates of a point that a deck gives by its name or its coordinates.

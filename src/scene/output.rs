@@ -37,11 +37,19 @@ impl Columns<'_> {
     pub fn written(&self, diagnostics: &mut Vec<Diagnostic>) -> Vec<Probe> {
         let groups = self.written_groups(diagnostics);
         let mut probes = Vec::new();
+        let mut blamed: Vec<&str> = Vec::new();
         for node in self.written_nodes(diagnostics) {
             for group in groups.iter().filter(|group| group.is_of_node()) {
                 match self.node_probe(&node, group) {
                     Ok(probe) => probes.push(probe),
-                    Err(diagnostic) => diagnostics.push(diagnostic),
+                    Err(diagnostic) => match self.word_of_default_nodes(group) {
+                        None => diagnostics.push(diagnostic),
+                        Some(_) if blamed.contains(&group.key) => {}
+                        Some(word) => {
+                            blamed.push(group.key);
+                            diagnostics.push(at_word(diagnostic, word));
+                        }
+                    },
                 }
             }
             if groups.iter().any(|group| is_stress(group)) {
@@ -78,6 +86,13 @@ impl Columns<'_> {
             known.push(group);
         }
         known
+    }
+
+    /// The word that asks for a group of columns at all points, where no `nodes` are named.
+    fn word_of_default_nodes(&self, group: &ColumnGroup) -> Option<&Span> {
+        let is_default = self.deck.output.nodes.is_none();
+        let keys = self.deck.output.columns.iter().flatten();
+        keys.filter(|_| is_default).find(|key| key.value == group.key).map(|key| &key.span)
     }
 
     fn written_nodes(&self, diagnostics: &mut Vec<Diagnostic>) -> Vec<Spanned<String>> {
@@ -341,6 +356,13 @@ fn whole_probe(group: &'static ColumnGroup) -> Option<Probe> {
         | Source::StressPoint(_)
         | Source::Contact(_) => None,
     }
+}
+
+/// An error about one of all points, where the deck names no nodes: at the word that asks for the
+/// columns.
+fn at_word(diagnostic: Diagnostic, word: &Span) -> Diagnostic {
+    let message = format!("{} (without `nodes`, columns are written at all points)", diagnostic.message);
+    Diagnostic::error(message, word.clone()).help("name the places in `nodes`, such as `nodes = [\"arm@0.5\"]`")
 }
 
 /// True for columns of stresses, whose groups depend on the section.

@@ -176,8 +176,8 @@ fn stress_at_point(
         Some(Solution { analysis, materials, .. }) => {
             let field = analysis.stresses(materials).map_err(|error| broken(section, &error, span))?;
             let is_oriented = |region: &Region| !materials[region.material].is_isotropic();
-            let is_oriented: Vec<bool> = analysis.mesh.regions.iter().map(is_oriented).collect();
-            stresses.at(point.at, Some((&analysis.mesh, field, &is_oriented)))
+            let is_oriented: Vec<bool> = field.mesh.regions.iter().map(is_oriented).collect();
+            stresses.at(point.at, Some((field, &is_oriented)))
         }
     };
     found.ok_or_else(|| {
@@ -239,7 +239,7 @@ pub fn recovery(section: &deck::Section, deck: &Deck, span: &Span) -> Result<Rec
         CornerWord::Include => Corners::Include,
     };
     let field = analysis.stresses(&materials).map_err(|error| broken(section, &error, span))?;
-    Ok(Recovery::computed(name, &analysis.mesh, field, placement, corners, &laws))
+    Ok(Recovery::computed(name, field, placement, corners, &laws))
 }
 
 fn broken(section: &deck::Section, error: &beamsim_core::section::SectionError, span: &Span) -> Diagnostic {
@@ -276,7 +276,7 @@ fn closed_form(shape: &Shape, nu: f64) -> ClosedForm {
         Shape::Tube { radius, thickness } => ClosedShape::Ring { radii: [radius - thickness, radius] },
         Shape::Rectangle { width, height } => ClosedShape::Rectangle { half: [0.5 * width, 0.5 * height] },
     };
-    ClosedForm { shape, nu }
+    ClosedForm::new(shape, nu)
 }
 
 /// The law of a material that has strengths.

@@ -131,6 +131,12 @@ fn a_failed_run_keeps_what_it_reached() {
     assert_eq!(folder.names("results/good"), ["history.partial.csv", "run.json"]);
     let record = fs::read_to_string(folder.0.join("results/good/run.json")).unwrap();
     assert!(record.contains("\"status\": \"not_converged\""));
+    // Tables along beams, too; and those of the run before do not stay.
+    let along = ["--set", "output.profile=true"];
+    assert_eq!(status(&folder.beamsim(&[&["run", "good.toml"], &along[..]].concat())), 0);
+    assert_eq!(folder.names("results/good"), ["history.csv", "profile.csv", "run.json"]);
+    assert_eq!(status(&folder.beamsim(&[&tight[..], &along].concat())), 3);
+    assert_eq!(folder.names("results/good"), ["history.partial.csv", "profile.partial.csv", "run.json"]);
 }
 
 /// A history never holds NaN or infinity.

@@ -1,9 +1,9 @@
-//! Decks from files of other programs: blades of BeamDyn.
+//! Decks from files of other programs: blades of BeamDyn and windIO.
 
 use super::folder::{Folder, last_line, status};
 use crate::failures::frequencies;
 use crate::scenes::simulate;
-use beamsim::import::{abaqus_deck, beamdyn_deck, read_abaqus, read_blade, read_driver};
+use beamsim::import::{abaqus_deck, blade_deck, read_abaqus, read_blade, read_driver, read_windio};
 use std::fs;
 
 fn text(name: &str) -> String {
@@ -15,7 +15,7 @@ fn nrel(primary: &str, blade: &str, driver: Option<&str>) -> Result<String, Stri
     let driver = driver.map(|text| read_driver("d.dat", text)).transpose().map_err(|error| error.to_string())?;
     let open = |_: &str| Ok(("b.dat".to_string(), blade.to_string()));
     let blade = read_blade("p.dat", primary, open).map_err(|error| error.to_string())?;
-    Ok(beamdyn_deck(&blade, driver.as_ref()).deck)
+    Ok(blade_deck(&blade, driver.as_ref()).deck)
 }
 
 /// The modes of the blade alone, as published: the turbine has collective flap 0.6993 Hz and
@@ -211,6 +211,79 @@ fn wrong_files_are_refused_at_their_place() {
             "{message}
 expected {told}"
         );
+    }
+}
+
+/// The deck of a turbine of windIO.
+fn windio(yaml: &str) -> Result<String, String> {
+    let blade = read_windio("t.yaml", yaml).map_err(|error| error.to_string())?;
+    Ok(blade_deck(&blade, None).deck)
+}
+
+/// The same blade in both forms: same sections, same line, same twist.
+#[test]
+fn windio_and_beamdyn_describe_one_blade() {
+    let yaml = windio(&text("nrel_5mw_windio.yaml")).unwrap();
+    let beamdyn = nrel(&text("nrel_5mw.dat"), &text("nrel_5mw_blade.dat"), None).unwrap();
+    assert!(yaml.contains("# From a file of windIO: the blade (six_x_six) of t.yaml"), "{yaml}");
+    let numbers = |deck: &str| -> Vec<f64> {
+        let text: Vec<&str> = deck.lines().filter(|line| !line.starts_with('#')).collect();
+        let text = text.join("\n");
+        let text = text.split("[damping]").next().unwrap().split("[[stage]]").next().unwrap();
+        let without = |line: &str| line.split('#').next().unwrap_or("").to_string();
+        let text: String = text.lines().map(without).collect::<Vec<_>>().join("\n");
+        text.split(|c: char| " ,[]\n".contains(c)).filter_map(|word| word.parse().ok()).collect()
+    };
+    let [a, b] = [numbers(&yaml), numbers(&beamdyn)];
+    assert!(a.len() == b.len() && a.len() > 1500, "{} {}", a.len(), b.len());
+    for (a, b) in a.iter().zip(&b) {
+        assert!((a - b).abs() <= 1e-9 * b.abs().max(1.0), "{a} {b}");
+    }
+}
+
+/// A matrix with all couplings: the upper triangle by rows, in the order x y z x y z.
+#[test]
+fn matrices_of_windio_are_upper_triangles_in_the_order_of_beamdyn() {
+    let text = text("nrel_5mw_windio.yaml");
+    let row = text.lines().find(|line| line.trim_start().starts_with("-  [972948000.0")).unwrap();
+    let coupled = "                       -  [9e8, 1e6, 2e6, 3e6, 4e6, 5e6, 8e8, 6e6, 7e6, 8e6, 9e6, 9e9, 10e6, 11e6, 12e6, \
+                   1.8e10, 13e6, 14e6, 1.7e10, 15e6, 5.5e9]";
+    let deck = windio(&text.replace(row, coupled)).unwrap();
+    // Axes 1, 2, 3 are z, x, y.
+    let expected = "stiffness = [\n  [9000000000.0, 2000000.0, 6000000.0, 12000000.0, 10000000.0, 11000000.0],\n  \
+                    [2000000.0, 900000000.0, 1000000.0, 5000000.0, 3000000.0, 4000000.0],";
+    assert!(deck.contains(expected), "{}", &deck[..2000]);
+}
+
+#[test]
+fn wrong_turbines_are_refused_at_their_place() {
+    let text = text("nrel_5mw_windio.yaml");
+    for (from, to, told) in [
+        (
+            "six_x_six:",
+            "timoschenko_hawc:",
+            "t.yaml:3:1: there is no `components.blade.elastic_properties_mb.six_x_six`",
+        ),
+        ("stiff_matrix:", "stiffness:", "there is no `stiff_matrix` here"),
+        ("-  [972948000.0, ", "-  [", "a matrix has the 21 entries of its upper triangle by rows, found 20"),
+        ("-  [972948000.0, ", "-  [-972948000.0, ", "the stiffness of a station is not positive definite (at 0.0"),
+        ("-  [972948000.0, ", "-  [1e9l, ", "a matrix of `stiff_matrix` must be numbers"),
+        ("-  [678.935, ", "-  [700.0, ", "mass of a station differs by direction"),
+        ("&span [0.0, ", "&span [0.1, ", "`grid` of the twist must increase from 0 to 1"),
+        ("grid: [0.0, 1.0]", "grid: [0.0, 0.5, 1.0]", "`x` of the reference axis has 2 values and 3 places in `grid`"),
+        ("*axis", "*axes", "t.yaml:22:33: this is no YAML"),
+        (
+            "[0.0, 1.199865, ",
+            "[0.0, -1.199865, ",
+            "`z` of the reference axis must increase, but does not before 0.01951",
+        ),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let message = windio(&text.replacen(from, to, 1)).expect_err(told);
+        assert!(message.contains(told), "{message}\nexpected {told}");
+    }
+    for end in (0..text.len()).step_by(997).filter(|&end| text.is_char_boundary(end)) {
+        let _ = windio(&text[..end]);
     }
 }
 

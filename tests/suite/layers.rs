@@ -19,7 +19,7 @@ const DECK_ROWS: [&str; 2] = ["beamsim_core::effect::joint::JointKind", "beamsim
 const BELOW_ALL: [&str; 2] = ["failure", "warning"];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 22] = [
+const CRATES: [(&str, &[&str]); 23] = [
     ("rayon", &["core/src/threads.rs"]),
     (
         "faer",
@@ -31,6 +31,7 @@ const CRATES: [(&str, &[&str]); 22] = [
             "core/src/solve/block/order.rs",
         ],
     ),
+    ("saphyr_parser", &["src/import/yaml.rs"]),
     ("spade", &["core/src/section/triangulate.rs"]),
     ("toml", &["src/deck/"]),
     ("toml_edit", &["src/deck/"]),

@@ -235,3 +235,50 @@ fn runs_that_failed_are_marked() {
     assert_eq!(status(&empty), 2);
     assert!(last_line(&empty).ends_with("has no rows: the run failed before its first state (not_converged)"));
 }
+
+/// Two beams of a profile, with stress known on one of them.
+const BEAMS: &str = "units = { length = \"m\", force = \"N\", time = \"s\" }\n\
+     [point]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [2, 0, 0]\n[material.m]\nE = 1e9\nnu = 0.3\n\
+     [section.bar]\nshape = \"rectangle\"\nmaterial = \"m\"\nwidth = 0.02\nheight = 0.04\n\
+     [section.s]\nEA = 1e6\nGA = 1e6\nGJ = 50\nEI = 100\n\
+     [[beam]]\nname = \"first\"\nsection = \"bar\"\nthrough = [\"a\", \"b\"]\nelements = 2\n\
+     [[beam]]\nname = \"second\"\nsection = \"s\"\nthrough = [\"b\", \"c\"]\nelements = 2\n\
+     [[support]]\nat = \"a\"\nfix = \"all\"\n[[load]]\nat = \"c\"\nforce = [0, 0, 2]\n\
+     [[stage]]\nkind = \"static\"\nsteps = 2\n[[stage]]\nkind = \"static\"\nsteps = 1\n\
+     [output]\nnodes = [\"c\"]\nprofile = true\n";
+
+#[test]
+fn a_profile_is_a_diagram_over_the_length_of_beams() {
+    let folder = Folder::new("plot-profile");
+    folder.write("deck.toml", BEAMS);
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--out", "r"])), 0);
+    let told = |words: &[&str]| {
+        let output = folder.beamsim(&[&["plot", "r/profile.csv"], words].concat());
+        (
+            status(&output),
+            String::from_utf8_lossy(&[output.stdout.clone(), output.stderr.clone()].concat()).into_owned(),
+        )
+    };
+    let (ended, text) = told(&[]);
+    assert!(ended == 0 && text.contains("drawn: M2; not drawn: N1"), "{text}");
+    let picture = fs::read_to_string(folder.0.join("r/profile.svg")).unwrap();
+    for word in [">first<", ">second<", "length along the beam [m]", "M2", "end of stage 2"] {
+        assert!(picture.contains(word), "{word}");
+    }
+    assert!(!picture.contains("NaN"));
+    let (ended, _) = told(&["--column", "vm", "--beam", "first", "--stage", "1", "--out", "s.svg"]);
+    let picture = fs::read_to_string(folder.0.join("s.svg")).unwrap();
+    assert!(ended == 0 && picture.contains("end of stage 1") && picture.contains("N/m²"), "{picture}");
+    for (words, expected) in [
+        (&["--beam", "firs"][..], "the profile has no beam `firs`: did you mean `first`?"),
+        (&["--column", "M4"], "the profile has no column `M4`"),
+        (&["--stage", "3"], "the profile has no stage 3: it has stages up to 2"),
+        (&["--x", "load"], "`--x` is for histories"),
+        (&["r"], "is a profile along beams, which is drawn alone"),
+    ] {
+        let (ended, text) = told(words);
+        assert!(ended == 2 && text.contains(expected), "{ended} {text}");
+    }
+    let output = folder.beamsim(&["plot", "r", "--beam", "first"]);
+    assert!(last_line(&output).contains("`--beam` is for profiles along beams"), "{}", last_line(&output));
+}

@@ -236,3 +236,31 @@ fn a_browser_shows_static_stages_one_after_the_other() {
     let titles = ["a@end", "tip", "b@0.1"].map(|node| format!("{node}: displacement"));
     play(&folder, "r", &["load factor, stage by stage", &titles[0], &titles[1], &titles[2]]);
 }
+
+/// Where stresses are asked for, colours show the largest one of the section.
+#[test]
+fn colours_show_stress_where_it_was_asked_for() {
+    let folder = Folder::new("report-stress");
+    let deck = |output: &str| {
+        format!(
+            "units = {{ length = \"m\", force = \"N\", time = \"s\" }}\n[point]\nroot = [0, 0, 0]\ntip = [1, 0, 0]\n\
+             [material.m]\nE = 1e9\nnu = 0.3\n\
+             [section.bar]\nshape = \"rectangle\"\nmaterial = \"m\"\nwidth = 0.02\nheight = 0.04\n\
+             [[beam]]\nname = \"arm\"\nsection = \"bar\"\nthrough = [\"root\", \"tip\"]\nelements = 8\norder = 2\n\
+             [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 0, 1]\n\
+             [[stage]]\nkind = \"static\"\nsteps = 1\n[output]\nnodes = [\"tip\", \"arm@0\"]\n{output}\n"
+        )
+    };
+    let field = |output: &str| {
+        folder.write("deck.toml", &deck(output));
+        assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--report", "--out", "r"])), 0);
+        let data = data(&fs::read_to_string(folder.0.join("r/report.html")).unwrap());
+        data["scene"]["fields"].as_array().unwrap().iter().find(|field| field["name"] == "vm").cloned()
+    };
+    assert!(field("columns = [\"u\"]").is_none());
+    let found = field("columns = [\"u\"]\nenvelope = true").unwrap();
+    assert!(found["unit"] == "N/m²" && found["label"] == "largest von Mises stress", "{found}");
+    // At the clamp M/W, W = b h²/6.
+    let high = found["high"].as_f64().unwrap();
+    assert!((high / (6.0 / (0.02 * 0.04 * 0.04)) - 1.0).abs() < 0.02, "{high}");
+}

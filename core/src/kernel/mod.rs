@@ -18,6 +18,7 @@ pub mod planar;
 pub mod relative;
 pub mod seam;
 pub mod shape;
+pub mod spline;
 pub mod turn;
 pub mod volume;
 

@@ -1,20 +1,26 @@
 //! The largest stresses over the time of a run, at places along beams.
 
+use super::largest_row::{Extreme, LargestRow, Row};
 use super::place::StressPlace;
-use crate::run::{Moment, Snapshot};
-use crate::section::recovery::Measure;
-use crate::section::stress::Peak;
-use crate::section::{Point, Vector6};
+use crate::run::Snapshot;
+use crate::section::recovery::Criterion;
 use serde::{Deserialize, Serialize};
 
 /// The largest stresses so far.
 pub struct Envelope {
     places: Vec<StressPlace>,
-    found: Vec<Extremes>,
+    followed: Vec<Followed>,
+}
+
+/// The rows of a place that have, or may have, its largest stresses.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+pub struct Followed {
+    von_mises: LargestRow,
+    index: LargestRow,
 }
 
 /// The largest stresses of a place.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extremes {
     /// Largest von Mises stress
     pub von_mises: Option<Extreme>,
@@ -22,32 +28,17 @@ pub struct Extremes {
     pub index: Option<Extreme>,
 }
 
-/// The largest value so far, with when and where it was.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-pub struct Extreme {
-    /// The value
-    pub value: f64,
-    /// When
-    pub moment: Moment,
-    /// Coordinates 2 and 3 of the shape
-    pub at: Point,
-    /// Index of the region
-    pub region: usize,
-    /// N1 N2 N3 M1 M2 M3 then
-    pub resultant: [f64; 6],
-}
-
 impl Envelope {
     /// An envelope at places, before the first row.
     pub fn new(places: Vec<StressPlace>) -> Self {
-        let found = vec![Extremes::default(); places.len()];
-        Self { places, found }
+        let followed = vec![Followed::default(); places.len()];
+        Self { places, followed }
     }
 
-    /// An envelope that goes on from what was found before.
-    pub fn resume(places: Vec<StressPlace>, found: Vec<Extremes>) -> Self {
+    /// An envelope that goes on from rows that were followed before.
+    pub fn resume(places: Vec<StressPlace>, followed: Vec<Followed>) -> Self {
         let mut envelope = Self::new(places);
-        envelope.found.iter_mut().zip(found).for_each(|(new, old)| *new = old);
+        envelope.followed.iter_mut().zip(followed).for_each(|(new, old)| *new = old);
         envelope
     }
 
@@ -56,34 +47,29 @@ impl Envelope {
         &self.places
     }
 
+    /// The rows that have, or may have, the largest stresses, place by place.
+    pub fn followed(&self) -> &[Followed] {
+        &self.followed
+    }
+
     /// The largest stresses so far, place by place.
-    pub fn found(&self) -> &[Extremes] {
-        &self.found
+    pub fn found(&self) -> Vec<Extremes> {
+        let of_place = |(place, followed): (&StressPlace, &Followed)| Extremes {
+            von_mises: followed.von_mises.found(&place.section, Criterion::VonMises),
+            index: followed.index.found(&place.section, Criterion::FailureIndex),
+        };
+        self.places.iter().zip(&self.followed).map(of_place).collect()
     }
 
     /// Takes a converged state.
     pub fn row(&mut self, at: &Snapshot) {
-        for (place, found) in self.places.iter().zip(&mut self.found) {
-            let load = place.inside.resultant(at.state, at.origin);
-            let floor = |extreme: &Option<Extreme>| extreme.map_or(f64::NEG_INFINITY, |extreme| extreme.value);
-            let extreme = |Peak { value, at: point, region }: Peak| Extreme {
-                value,
-                moment: at.moment(),
-                at: point,
-                region,
-                resultant: resultants(&load),
-            };
-            let section = &place.section;
-            if let Some(peak) = section.largest(Measure::VonMises, &load, floor(&found.von_mises)) {
-                found.von_mises = Some(extreme(peak));
-            }
-            if let Some(peak) = section.largest_index(&load, floor(&found.index)) {
-                found.index = Some(extreme(peak));
+        let moment = at.moment();
+        for (place, Followed { von_mises, index }) in self.places.iter().zip(&mut self.followed) {
+            let resultant = place.inside.strain_and_stress(at.state, at.origin)[1];
+            von_mises.row(&place.section, Criterion::VonMises, Row { moment, resultant });
+            if place.section.section().has_strength() {
+                index.row(&place.section, Criterion::FailureIndex, Row { moment, resultant });
             }
         }
     }
-}
-
-fn resultants(load: &Vector6) -> [f64; 6] {
-    std::array::from_fn(|k| load[k])
 }

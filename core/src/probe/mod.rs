@@ -4,6 +4,7 @@
 mod columns;
 mod envelope;
 mod figure;
+mod largest_row;
 mod place;
 mod profile;
 mod reading;
@@ -12,8 +13,9 @@ pub use columns::{
     COLUMNS, ColumnGroup, ColumnPart, Dimension, ENERGY_WITH_CONTACTS, MeshError, Nearest, Need, Quantity,
     STRESS_AT_POINT, STRESS_WITH_INDEX, Source, clocks, find_column, find_part, group, quantity,
 };
-pub use envelope::{Envelope, Extreme, Extremes};
+pub use envelope::{Envelope, Extremes, Followed};
 pub use figure::{Figure, Line, LinePoint, Look};
+pub use largest_row::Extreme;
 pub use place::{BeamPoint, Place, StressPlace, StressPoint};
 pub use profile::{Profile, ProfilePlace, StageEnd};
 pub use reading::{Probe, Reading};

@@ -34,6 +34,12 @@ const MAX_JUMP: usize = 4;
 /// Highest level of the first mesh
 const MAX_FIRST_LEVEL: usize = 4;
 
+/// Nodes up to which the mesh of stresses is made finer than that of the stiffness
+const STRESS_NODES: f64 = 3000.0;
+
+/// Levels by which the mesh of stresses is finer, at most: errors of stresses fall to a fifth
+const MOST_STRESS_JUMP: usize = 2;
+
 /// The point of a section through which the line of the beam goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reference {
@@ -77,8 +83,21 @@ pub struct Analysis {
     pub meets_aim: bool,
     /// Level of the mesh
     pub level: usize,
+    /// The shape, for a mesh of stresses
+    geometry: Geometry,
+    /// True if a mesh of stresses may be finer than that of the stiffness
+    refines_stresses: bool,
     /// Stresses under unit resultants, found when they are asked for
-    stresses: OnceLock<Result<NodalStresses, SectionError>>,
+    stresses: OnceLock<Result<StressField, SectionError>>,
+}
+
+/// Stresses of a section with the mesh that they belong to.
+#[derive(Clone, Debug)]
+pub struct StressField {
+    /// The mesh, which may be finer than that of the stiffness
+    pub mesh: Mesh,
+    /// Stresses at its nodes
+    pub nodal: NodalStresses,
 }
 
 /// The aim of a mesh.
@@ -136,9 +155,11 @@ impl Computed {
         (1..=MAX_JUMP).rev().find(|&jump| nodes(jump) <= MAX_NODES as f64).unwrap_or(0)
     }
 
-    fn finish(self, estimate: f64, meets_aim: bool) -> Analysis {
+    fn finish(self, geometry: &Geometry, aim: MeshAim, estimate: f64, meets_aim: bool) -> Analysis {
         let Self { mesh, solution, level } = self;
-        Analysis { mesh, solution, estimate, meets_aim, level, stresses: OnceLock::new() }
+        let refines_stresses = matches!(aim, MeshAim::Error(_));
+        let geometry = geometry.clone();
+        Analysis { mesh, solution, estimate, meets_aim, level, geometry, refines_stresses, stresses: OnceLock::new() }
     }
 }
 
@@ -155,11 +176,11 @@ pub fn analyse(geometry: &Geometry, materials: &[Material], aim: MeshAim) -> Res
             MeshAim::Size(size) => libm::log(finer.mesh.longest_side() / size) / libm::log(REFINEMENT),
         };
         if wanted_jump <= 0.0 {
-            return Ok(finer.finish(estimate, true));
+            return Ok(finer.finish(geometry, aim, estimate, true));
         }
         jump = finer.possible_jump().min(wanted_jump.ceil() as usize);
         if jump == 0 {
-            return Ok(finer.finish(estimate, false));
+            return Ok(finer.finish(geometry, aim, estimate, false));
         }
         coarser = finer;
     }
@@ -215,8 +236,26 @@ impl Analysis {
     }
 
     /// Stresses under unit resultants, computed once. The materials are those of the analysis.
-    pub fn stresses(&self, materials: &[Material]) -> Result<&NodalStresses, SectionError> {
-        let stresses = self.stresses.get_or_init(|| NodalStresses::new(&self.mesh, materials, &self.solution));
-        stresses.as_ref().map_err(Clone::clone)
+    ///
+    /// Errors of stresses fall with the square of the size of elements, those of the stiffness with
+    /// its fourth power: where the mesh of the stiffness is coarse, stresses have a finer one.
+    pub fn stresses(&self, materials: &[Material]) -> Result<&StressField, SectionError> {
+        let find = || {
+            let jump = if self.refines_stresses { self.stress_jump() } else { 0 };
+            if jump == 0 {
+                let nodal = NodalStresses::new(&self.mesh, materials, &self.solution)?;
+                return Ok(StressField { mesh: self.mesh.clone(), nodal });
+            }
+            let Computed { mesh, solution, .. } = Computed::new(&self.geometry, materials, self.level + jump)?;
+            let nodal = NodalStresses::new(&mesh, materials, &solution)?;
+            Ok(StressField { mesh, nodal })
+        };
+        self.stresses.get_or_init(find).as_ref().map_err(Clone::clone)
+    }
+
+    /// Levels by which the mesh of stresses is finer.
+    fn stress_jump(&self) -> usize {
+        let nodes = |jump: usize| self.mesh.nodes.len() as f64 * REFINEMENT.powi(2 * jump as i32);
+        (1..=MOST_STRESS_JUMP).rev().find(|&jump| nodes(jump) <= STRESS_NODES).unwrap_or(0)
     }
 }

@@ -1,7 +1,7 @@
 //! Stresses of circles, tubes and rectangles of one isotropic material, in closed form: tension and
 //! bending of straight beams, Saint-Venant torsion and flexure.
 
-use super::{Matrix6, Point};
+use super::{Matrix6, Point, Vector6};
 use std::f64::consts::{PI, TAU};
 
 /// Terms of series. The slowest ones, at the sides of a rectangle, alternate and fall with the
@@ -11,10 +11,14 @@ const TERMS: i32 = 200;
 /// A section with closed forms for its stresses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosedForm {
-    /// Shape
-    pub shape: ClosedShape,
+    shape: ClosedShape,
     /// Poisson's ratio
-    pub nu: f64,
+    nu: f64,
+    area: f64,
+    /// Second moments of area about 2 and 3
+    second: [f64; 2],
+    /// Torsion constant of a rectangle; the polar moment of a ring
+    torsion: f64,
 }
 
 /// Shapes with closed forms, with their centre at the origin.
@@ -33,50 +37,63 @@ pub enum ClosedShape {
 }
 
 impl ClosedForm {
-    /// Stresses at a point under the six unit resultants about the centre, by columns.
-    pub fn unit(&self, at: Point) -> Matrix6 {
-        let [x2, x3] = at;
-        let [area, about_2, about_3] = self.areas();
-        let mut unit = Matrix6::zeros();
-        unit[(0, 0)] = 1.0 / area;
-        unit[(0, 4)] = x3 / about_2;
-        unit[(0, 5)] = -x2 / about_3;
-        let mut shear = |column: usize, [s12, s13]: [f64; 2]| {
-            unit[(5, column)] = s12;
-            unit[(4, column)] = s13;
-        };
-        match self.shape {
-            ClosedShape::Ring { radii } => {
-                let polar = about_2 + about_3;
-                shear(3, [-x3 / polar, x2 / polar]);
-                shear(1, ring_flexure(radii, self.nu, about_3, at));
-                // A force along 3 is one along 2 that is turned by a right angle: 2 to 3, 3 to -2.
-                let [along, across] = ring_flexure(radii, self.nu, about_2, [x3, -x2]);
-                shear(2, [-across, along]);
-            }
-            ClosedShape::Rectangle { half } => {
-                let [a, b] = half;
-                shear(3, rectangle_torsion(half, at));
-                shear(1, rectangle_flexure([a, b], self.nu, at));
-                let [along, across] = rectangle_flexure([b, a], self.nu, [x3, x2]);
-                shear(2, [across, along]);
-            }
-        }
-        unit
-    }
-
-    /// Area, and second moments of area about 2 and 3.
-    fn areas(&self) -> [f64; 3] {
-        match self.shape {
+    /// A shape of a material with a Poisson's ratio.
+    pub fn new(shape: ClosedShape, nu: f64) -> Self {
+        match shape {
             ClosedShape::Ring { radii: [inner, outer] } => {
                 let [inner_2, outer_2] = [inner * inner, outer * outer];
                 let second = 0.25 * PI * (outer_2 * outer_2 - inner_2 * inner_2);
-                [PI * (outer_2 - inner_2), second, second]
+                Self { shape, nu, area: PI * (outer_2 - inner_2), second: [second; 2], torsion: 2.0 * second }
             }
             ClosedShape::Rectangle { half: [a, b] } => {
-                [4.0 * a * b, 4.0 / 3.0 * a * b * b * b, 4.0 / 3.0 * b * a * a * a]
+                let second = [4.0 / 3.0 * a * b * b * b, 4.0 / 3.0 * b * a * a * a];
+                Self { shape, nu, area: 4.0 * a * b, second, torsion: torsion_constant([a, b]) }
             }
         }
+    }
+
+    /// The shape.
+    pub fn shape(&self) -> ClosedShape {
+        self.shape
+    }
+
+    /// Stresses at a point under the six unit resultants about the centre, by columns.
+    pub fn unit(&self, at: Point) -> Matrix6 {
+        Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|k| self.stress(&Vector6::ith(k, 1.0), at)))
+    }
+
+    /// The stress at a point under resultants about the centre.
+    pub fn stress(&self, load: &Vector6, at: Point) -> Vector6 {
+        let [x2, x3] = at;
+        let [about_2, about_3] = self.second;
+        let axial = load[0] / self.area + load[4] * x3 / about_2 - load[5] * x2 / about_3;
+        let mut shear = [0.0; 2];
+        let mut add = |size: f64, part: &dyn Fn() -> [f64; 2]| {
+            if size != 0.0 {
+                let [s12, s13] = part();
+                shear = [shear[0] + size * s12, shear[1] + size * s13];
+            }
+        };
+        match self.shape {
+            ClosedShape::Ring { radii } => {
+                add(load[3], &|| [-x3 / self.torsion, x2 / self.torsion]);
+                add(load[1], &|| ring_flexure(radii, self.nu, about_3, at));
+                // A force along 3 is one along 2 that is turned by a right angle: 2 to 3, 3 to -2.
+                add(load[2], &|| {
+                    let [along, across] = ring_flexure(radii, self.nu, about_2, [x3, -x2]);
+                    [-across, along]
+                });
+            }
+            ClosedShape::Rectangle { half: [a, b] } => {
+                add(load[3], &|| rectangle_torsion([a, b], self.torsion, at));
+                add(load[1], &|| rectangle_flexure([a, b], self.nu, at));
+                add(load[2], &|| {
+                    let [along, across] = rectangle_flexure([b, a], self.nu, [x3, x2]);
+                    [across, along]
+                });
+            }
+        }
+        Vector6::new(axial, 0.0, 0.0, 0.0, shear[1], shear[0])
     }
 
     /// True if a point belongs to the section, within a part of its size.
@@ -148,26 +165,26 @@ fn ring_flexure([inner, outer]: [f64; 2], nu: f64, second: f64, [x, y]: Point) -
 /// Shear stresses s12 and s13 of a rectangle with half sides (a, b) along (2, 3) under a unit
 /// torque, from the series of the stress function in one direction or the other: the one that
 /// converges faster at the point (Timoshenko & Goodier, Theory of Elasticity, art. 109).
-fn rectangle_torsion([a, b]: [f64; 2], [x2, x3]: Point) -> [f64; 2] {
+fn rectangle_torsion([a, b]: [f64; 2], torsion: f64, [x2, x3]: Point) -> [f64; 2] {
     let stress = |a: f64, b: f64, x: f64, y: f64| {
         let mut sum = [0.0; 2];
+        let mut term = Term::new(PI / (2.0 * a), [x, y], b, 2);
         for number in (1..2 * TERMS).step_by(2) {
-            let k = f64::from(number) * PI / (2.0 * a);
             let sign = if number % 4 == 1 { 1.0 } else { -1.0 };
-            let (sin, cos) = libm::sincos(k * x);
-            let [cosh, sinh] = over_cosh(k, y, b);
-            let size = sign / f64::from(number).powi(2);
+            let size = sign / f64::from(number * number);
+            let [cosh, sinh] = term.over_cosh();
+            let [sin, cos] = term.wave;
             sum[0] += size * sinh * cos;
             sum[1] += size * cosh * sin;
-            if k * (b - y.abs()) > ROUND_OFF_EXPONENT {
+            if term.is_round_off() {
                 break;
             }
+            term.advance();
         }
         // For a twist of 1 with G = 1; the parabola 1 - (x/a)^2 is the part that is no series.
         let scale = 16.0 * a / (PI * PI);
         [-scale * sum[0], 2.0 * x - scale * sum[1]]
     };
-    let torsion = torsion_constant([a, b]);
     if (b - x3.abs()) * b >= (a - x2.abs()) * a {
         let [along, across] = stress(a, b, x2, x3);
         [along / torsion, across / torsion]
@@ -177,14 +194,53 @@ fn rectangle_torsion([a, b]: [f64; 2], [x2, x3]: Point) -> [f64; 2] {
     }
 }
 
-/// Factors below exp(-x) of this x do not matter
-const ROUND_OFF_EXPONENT: f64 = 40.0;
+/// A term of a series in n: sine and cosine of n k x, cosh(n k y)/cosh(n k b) and
+/// sinh(n k y)/cosh(n k b) with |y| <= b. All but the first term follow from the one before by
+/// products, without overflow.
+struct Term {
+    /// sin(n k x), cos(n k x)
+    wave: [f64; 2],
+    turn: [f64; 2],
+    /// exp(n k (|y| - b)), exp(-2 n k b), exp(-2 n k |y|)
+    decay: [f64; 3],
+    factor: [f64; 3],
+    sign: f64,
+}
 
-/// cosh(k y)/cosh(k b) and sinh(k y)/cosh(k b) without overflow, |y| <= b.
-fn over_cosh(k: f64, y: f64, b: f64) -> [f64; 2] {
-    let outer = libm::exp(k * (y.abs() - b)) / (1.0 + libm::exp(-2.0 * k * b));
-    let inner = libm::exp(-2.0 * k * y.abs());
-    [outer * (1.0 + inner), outer * (1.0 - inner) * y.signum()]
+/// Terms with a factor below this do not matter
+const ROUND_OFF_FACTOR: f64 = 4e-18;
+
+impl Term {
+    /// The term of n = 1; n grows by `step`.
+    fn new(k: f64, [x, y]: Point, b: f64, step: i32) -> Self {
+        let of = |n: f64| {
+            let (sin, cos) = libm::sincos(n * k * x);
+            let decay = [y.abs() - b, -2.0 * b, -2.0 * y.abs()].map(|length| libm::exp(n * k * length));
+            ([sin, cos], decay)
+        };
+        let (wave, decay) = of(1.0);
+        let (turn, factor) = of(f64::from(step));
+        Self { wave, turn, decay, factor, sign: y.signum() }
+    }
+
+    fn advance(&mut self) {
+        let [sin, cos] = self.wave;
+        let [turn_sin, turn_cos] = self.turn;
+        self.wave = [sin * turn_cos + cos * turn_sin, cos * turn_cos - sin * turn_sin];
+        for (decay, factor) in self.decay.iter_mut().zip(self.factor) {
+            *decay *= factor;
+        }
+    }
+
+    fn over_cosh(&self) -> [f64; 2] {
+        let [outer, both, inner] = self.decay;
+        let size = outer / (1.0 + both);
+        [size * (1.0 + inner), size * (1.0 - inner) * self.sign]
+    }
+
+    fn is_round_off(&self) -> bool {
+        self.decay[0] < ROUND_OFF_FACTOR
+    }
 }
 
 /// The torsion constant of a rectangle with half sides a and b.
@@ -204,17 +260,19 @@ fn torsion_constant([a, b]: [f64; 2]) -> f64 {
 fn rectangle_flexure([a, b]: [f64; 2], nu: f64, [x, y]: Point) -> [f64; 2] {
     let second = 4.0 / 3.0 * b * a * a * a;
     let mut sum = [0.0; 2];
+    let mut term = Term::new(PI / b, [y, x], a, 1);
     for number in 1..=TERMS {
         let k = f64::from(number) * PI / b;
         let sign = if number % 2 == 1 { 1.0 } else { -1.0 };
         let size = sign * 2.0 / (k * k);
-        let (sin, cos) = libm::sincos(k * y);
-        let [cosh, sinh] = over_cosh(k, x, a);
+        let [cosh, sinh] = term.over_cosh();
+        let [sin, cos] = term.wave;
         sum[0] += size * cosh * cos;
         sum[1] += size * sinh * sin;
-        if k * (a - x.abs()) > ROUND_OFF_EXPONENT {
+        if term.is_round_off() {
             break;
         }
+        term.advance();
     }
     let coupling = nu / (1.0 + nu);
     let along = 0.5 * (a * a - x * x) - coupling * (b * b / 6.0 - 0.5 * y * y - sum[0]);
@@ -247,8 +305,8 @@ mod tests {
     }
 
     fn forms() -> [ClosedForm; 4] {
-        let ring = |inner| ClosedForm { shape: ClosedShape::Ring { radii: [inner, 1.5] }, nu: 0.3 };
-        let rectangle = |half| ClosedForm { shape: ClosedShape::Rectangle { half }, nu: 0.3 };
+        let ring = |inner| ClosedForm::new(ClosedShape::Ring { radii: [inner, 1.5] }, 0.3);
+        let rectangle = |half| ClosedForm::new(ClosedShape::Rectangle { half }, 0.3);
         [ring(0.0), ring(0.9), rectangle([0.5, 1.0]), rectangle([2.0, 0.3])]
     }
 
@@ -299,16 +357,16 @@ mod tests {
         // Timoshenko & Goodier, art. 109: k = 0.208, 0.246, 0.312 for torsion; art. 122: 1.126 and
         // 1.143 of the mean at the sides of a square with Poisson's ratio 1/4 (their table).
         for (ratio, k) in [(1.0, 0.208), (2.0, 0.246), (10.0, 0.312)] {
-            let form = ClosedForm { shape: ClosedShape::Rectangle { half: [0.5, 0.5 * ratio] }, nu: 0.3 };
+            let form = ClosedForm::new(ClosedShape::Rectangle { half: [0.5, 0.5 * ratio] }, 0.3);
             let shear = form.unit([0.5, 0.0])[(4, 3)];
             assert!((shear * ratio * k - 1.0).abs() < 3e-3, "{ratio}: {shear}");
         }
-        let square = ClosedForm { shape: ClosedShape::Rectangle { half: [0.5, 0.5] }, nu: 0.25 };
+        let square = ClosedForm::new(ClosedShape::Rectangle { half: [0.5, 0.5] }, 0.25);
         let factor = |at| square.unit(at)[(5, 1)] / 1.5;
         assert!((factor([0.0, 0.0]) - 0.940).abs() < 2e-3, "{}", factor([0.0, 0.0]));
         assert!((factor([0.0, 0.5]) - 1.126).abs() < 2e-3, "{}", factor([0.0, 0.5]));
         // Circle: (3 + 2 nu)/(8 (1 + nu)) in the middle, (1 + 2 nu)/(4 (1 + nu)) at the rim.
-        let circle = ClosedForm { shape: ClosedShape::Ring { radii: [0.0, 1.0] }, nu: 0.3 };
+        let circle = ClosedForm::new(ClosedShape::Ring { radii: [0.0, 1.0] }, 0.3);
         let second = 0.25 * PI;
         assert!((circle.unit([0.0, 0.0])[(5, 1)] * second - 3.6 / 10.4).abs() < 1e-12);
         assert!((circle.unit([0.0, 1.0])[(5, 1)] * second - 1.6 / 5.2).abs() < 1e-12);

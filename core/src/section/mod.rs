@@ -13,12 +13,13 @@
 //! [`element`]s of oriented [`material`]s; [`saint_venant`] solves on it; [`properties`] derives
 //! centres and principal axes, [`stress`] recovers stresses, [`strength`] compares them with those
 //! that a material bears; [`closed`] has stresses in closed form, and [`recovery`] those of a section
-//! on a beam, whose largest one [`search`] finds; [`analysis`] chooses the mesh so that
+//! on a beam, whose largest one [`search`] and [`climb`] find and [`unit_peaks`] bound; [`analysis`] chooses the mesh so that
 //! its estimated error meets an aim.
 
 pub mod airfoil;
 pub mod analysis;
 pub mod blocks;
+pub mod climb;
 pub mod closed;
 pub mod divide;
 pub mod element;
@@ -36,6 +37,7 @@ pub mod search;
 pub mod strength;
 pub mod stress;
 pub mod triangulate;
+pub mod unit_peaks;
 pub mod walls;
 
 pub use analysis::{Analysis, analyse};

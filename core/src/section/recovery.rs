@@ -5,22 +5,21 @@
 //! in its axes; those of a [`PlacedRecovery`] are about the line of the beam, in the axes of the
 //! beam. Places, and stresses at fixed points, are in the coordinates of the shape.
 
-use super::closed::{ClosedForm, ClosedShape};
+use super::analysis::StressField;
+use super::climb::largest_near;
+use super::closed::ClosedForm;
 use super::material::{material_axes, stress_in_material_axes};
-use super::mesh::Mesh;
 use super::properties::load_about_origin;
 use super::search::{Hit, PointTree, Spread};
 use super::strength::FailureLaw;
-use super::stress::{Corners, NodalStresses, Peak, extreme_principal_stresses, von_mises};
+use super::stress::{Corners, Peak, extreme_principal_stresses, von_mises};
+use super::unit_peaks::{Parts, UnitPeaks};
 use super::{Matrix6, Point, Vector6};
 use std::sync::{Arc, OnceLock};
 
 /// The part of a value by which a sample of a closed form may be below the largest one between
 /// samples
 const BETWEEN_SAMPLES: f64 = 0.01;
-
-/// Samples from which the largest value of a closed form is looked for, at most
-const STARTS: usize = 4;
 
 /// Distance of a point outside a closed form, relative to its size
 const INSIDE_TOLERANCE: f64 = 1e-6;
@@ -68,6 +67,19 @@ impl Measure {
             }
         }
     }
+}
+
+/// Measures whose largest value over the rows of a run is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Criterion {
+    /// Von Mises stress
+    VonMises,
+    /// Failure index
+    FailureIndex,
+}
+
+impl Criterion {
+    const COUNT: usize = 2;
 }
 
 /// Where a shape lies on the beam.
@@ -123,6 +135,12 @@ struct FailureSearch {
     points: Vec<u32>,
 }
 
+impl FailureSearch {
+    fn spread(&self) -> &Spread {
+        self.spread.get_or_init(|| self.tree.spread(|s| self.law.index(s)))
+    }
+}
+
 /// The stresses of a section.
 #[derive(Clone, Debug)]
 pub struct Recovery {
@@ -140,6 +158,7 @@ pub struct Recovery {
     tree: PointTree,
     spreads: [OnceLock<Spread>; Measure::COUNT],
     failures: Vec<FailureSearch>,
+    unit_peaks: [OnceLock<UnitPeaks>; Criterion::COUNT],
 }
 
 /// Stresses at a fixed point of a section.
@@ -155,15 +174,17 @@ pub struct PointStress {
 #[derive(Clone, Debug)]
 pub struct PlacedRecovery {
     section: Arc<Recovery>,
-    /// From resultants of the beam to those about the origin of the section, in its axes
-    to_section: Matrix6,
+    /// From resultants of the beam to those about the origin of the section, in its axes; none if
+    /// both are the same
+    to_section: Option<Matrix6>,
 }
 
 impl PlacedRecovery {
     /// With the origin of the section at `offset` from the line of the beam, along axes 2 and 3 of the
     /// beam, and its axes turned by `turn`, rad.
     pub fn new(section: Arc<Recovery>, offset: Point, turn: f64) -> Self {
-        Self { section, to_section: Placement::beside(offset, turn).to_field() }
+        let is_moved = offset != [0.0; 2] || turn != 0.0;
+        Self { section, to_section: is_moved.then(|| Placement::beside(offset, turn).to_field()) }
     }
 
     /// The section, without its place on the beam.
@@ -171,20 +192,25 @@ impl PlacedRecovery {
         &self.section
     }
 
+    /// Resultants of the section from those of the beam.
+    pub fn in_section(&self, load: &Vector6) -> Vector6 {
+        self.to_section.map_or(*load, |to_section| to_section * load)
+    }
+
     /// The largest value of a measure over the section, if it is above a floor.
     pub fn largest(&self, measure: Measure, load: &Vector6, floor: f64) -> Option<Peak> {
-        self.section.largest(measure, &(self.to_section * load), floor)
+        self.section.largest(measure, &self.in_section(load), floor)
     }
 
     /// The largest failure index over the section, if it is above a floor.
     pub fn largest_index(&self, load: &Vector6, floor: f64) -> Option<Peak> {
-        self.section.largest_index(&(self.to_section * load), floor)
+        self.section.largest_index(&self.in_section(load), floor)
     }
 
     /// Stresses at a fixed point, see [`Recovery::at`].
-    pub fn at(&self, at: Point, field: Option<(&Mesh, &NodalStresses, &[bool])>) -> Option<PointStress> {
+    pub fn at(&self, at: Point, field: Option<(&StressField, &[bool])>) -> Option<PointStress> {
         let PointStress { unit } = self.section.at(at, field)?;
-        Some(PointStress { unit: unit * self.to_section })
+        Some(PointStress { unit: self.to_section.map_or(unit, |to_section| unit * to_section) })
     }
 }
 
@@ -212,8 +238,7 @@ impl Recovery {
     /// Of a computed section. `laws` are those of the materials, by their index.
     pub fn computed(
         name: &str,
-        mesh: &Mesh,
-        stresses: &NodalStresses,
+        StressField { mesh, nodal: stresses }: &StressField,
         placement: Placement,
         corners: Corners,
         laws: &[Option<FailureLaw>],
@@ -272,6 +297,7 @@ impl Recovery {
             tree,
             spreads: std::array::from_fn(|_| OnceLock::new()),
             failures,
+            unit_peaks: [const { OnceLock::new() }; Criterion::COUNT],
         }
     }
 
@@ -285,19 +311,72 @@ impl Recovery {
         !self.failures.is_empty()
     }
 
+    /// The largest value of a criterion over the section, if it is above a floor.
+    pub fn largest_of(&self, criterion: Criterion, load: &Vector6, floor: f64) -> Option<Peak> {
+        match criterion {
+            Criterion::VonMises => self.largest(Measure::VonMises, load, floor),
+            Criterion::FailureIndex => self.largest_index(load, floor),
+        }
+    }
+
+    /// The largest values of a criterion under unit resultants, from which bounds follow.
+    pub fn unit_peaks(&self, criterion: Criterion) -> &UnitPeaks {
+        self.unit_peaks[criterion as usize].get_or_init(|| {
+            let value =
+                |load: &Vector6| self.largest_of(criterion, load, f64::NEG_INFINITY).map_or(0.0, |peak| peak.value);
+            UnitPeaks::new(value, self.parts(criterion))
+        })
+    }
+
+    /// The way in which values of parts of a load bound the value of the load.
+    fn parts(&self, criterion: Criterion) -> Parts {
+        let is_von_mises = match criterion {
+            Criterion::VonMises => true,
+            Criterion::FailureIndex => self.failures.iter().all(|search| search.law.is_yield_alone()),
+        };
+        match (is_von_mises, self.closed) {
+            (true, Some(form)) => {
+                let is_central = self.placement.line == [0.0; 2];
+                Parts::AxialAndShear { is_round: is_central && form.is_closed(1) }
+            }
+            (true, None) => Parts::Even,
+            (false, _) => Parts::Any,
+        }
+    }
+
     /// The largest value of a measure over the section, if it is above a floor.
     pub fn largest(&self, measure: Measure, load: &Vector6, floor: f64) -> Option<Peak> {
-        let spread = self.spreads[measure as usize].get_or_init(|| self.tree.spread(|s| measure.of(s)));
-        self.search(&self.tree, spread, &|s| measure.of(s), load, floor, None)
+        self.search(&self.tree, self.spread(measure), &|s| measure.of(s), load, floor, None)
+    }
+
+    /// A value of a criterion that a sample of the section reaches, if its largest value over the
+    /// section may be above a floor.
+    pub fn may_exceed(&self, criterion: Criterion, load: &Vector6, floor: f64) -> Option<f64> {
+        if self.closed.is_none() {
+            return Some(self.largest_of(criterion, load, floor)?.value);
+        }
+        let below = floor - BETWEEN_SAMPLES * floor.abs();
+        let reached = match criterion {
+            Criterion::VonMises => self.tree.largest(self.spread(Measure::VonMises), von_mises, load, below)?,
+            Criterion::FailureIndex => {
+                let search = self.failures.first()?;
+                search.tree.largest(search.spread(), |s| search.law.index(s), load, below)?
+            }
+        };
+        Some(reached.value)
+    }
+
+    fn spread(&self, measure: Measure) -> &Spread {
+        self.spreads[measure as usize].get_or_init(|| self.tree.spread(|s| measure.of(s)))
     }
 
     /// The largest failure index over the section, if it is above a floor.
     pub fn largest_index(&self, load: &Vector6, floor: f64) -> Option<Peak> {
         let mut best: Option<Peak> = None;
-        for FailureSearch { law, tree, spread, points } in &self.failures {
-            let spread = spread.get_or_init(|| tree.spread(|s| law.index(s)));
+        for search in &self.failures {
+            let FailureSearch { law, tree, points, .. } = search;
             let floor = best.map_or(floor, |best| best.value);
-            if let Some(found) = self.search(tree, spread, &|s| law.index(s), load, floor, Some(points)) {
+            if let Some(found) = self.search(tree, search.spread(), &|s| law.index(s), load, floor, Some(points)) {
                 best = Some(found);
             }
         }
@@ -347,45 +426,23 @@ impl Recovery {
             hits.push(first);
         }
         let in_field = self.to_field * load;
-        let value_at = |point: Point| measure(&(form.unit(point) * in_field));
-        let value = |at: [f64; 2]| value_at(form.point(at));
-        let mut best = (first.value, self.points[first.point].0);
-        let mut starts: Vec<[usize; 2]> = Vec::new();
-        for hit in hits {
-            let start = self.sample(form, hit.point);
-            let is_near = |other: &[usize; 2]| (0..2).all(|axis| other[axis].abs_diff(start[axis]) <= 2);
-            if starts.iter().any(is_near) {
-                continue;
-            }
-            let (found, at) = climb(form, start, &value);
-            let (found, point) = cross_centre(form, (found, form.point(at)), &value_at);
-            if found > best.0 {
-                best = (found, point);
-            }
-            starts.push(start);
-            if starts.len() == STARTS {
-                break;
-            }
-        }
-        (best.0 > floor).then(|| Peak { value: best.0, at: self.placement.in_shape(best.1), region: 0 })
-    }
-
-    /// Numbers of a sample of a closed form along both coordinates.
-    fn sample(&self, form: ClosedForm, point: usize) -> [usize; 2] {
-        let rows = if form.is_closed(1) { form.samples()[1] } else { form.samples()[1] + 1 };
-        [point / rows, point % rows]
+        let value_at = |point: Point| measure(&form.stress(&in_field, point));
+        let samples = hits.iter().map(|hit| hit.point);
+        let (found, at) = largest_near(form, samples, &value_at)?;
+        let (value, at) = if found > first.value { (found, at) } else { (first.value, self.points[first.point].0) };
+        (value > floor).then(|| Peak { value, at: self.placement.in_shape(at), region: 0 })
     }
 
     /// Stresses at a fixed point in the coordinates of the shape; `None` outside the section.
     /// `field` is that of a computed section with, for each region, true if its material is
     /// oriented.
-    pub fn at(&self, at: Point, field: Option<(&Mesh, &NodalStresses, &[bool])>) -> Option<PointStress> {
+    pub fn at(&self, at: Point, field: Option<(&StressField, &[bool])>) -> Option<PointStress> {
         let at = [at[0] - self.placement.origin[0], at[1] - self.placement.origin[1]];
         let unit = match (self.closed, field) {
             (Some(form), _) => form.contains(at, INSIDE_TOLERANCE).then(|| form.unit(at) * self.to_field)?,
             (None, None) => return None,
-            (None, Some((mesh, stresses, is_oriented))) => {
-                let probes = stresses.probe(mesh, at);
+            (None, Some((field, is_oriented))) => {
+                let probes = field.nodal.probe(&field.mesh, at);
                 let probe = probes.iter().min_by_key(|probe| probe.region)?;
                 let unit = probe.unit * self.to_field;
                 let angles = [probe.beta, probe.theta];
@@ -404,95 +461,14 @@ fn in_material_axes(unit: &Matrix6, [beta, theta]: [f64; 2]) -> Matrix6 {
     }))
 }
 
-/// Passes along both coordinates with steps of one length, at most.
-const MOST_PASSES: usize = 8;
-
-/// A pass that adds less than this part of the value is the last one with its steps.
-const SMALL_GAIN: f64 = 1e-6;
-
-/// From a sample of a closed form to the largest value near it: parabolas along both coordinates,
-/// with shorter and shorter steps.
-fn climb(form: ClosedForm, start: [usize; 2], value: &dyn Fn([f64; 2]) -> f64) -> (f64, [f64; 2]) {
-    let domain = form.domain();
-    let counts = form.samples();
-    let steps = [0, 1].map(|axis| (domain[axis][1] - domain[axis][0]) / counts[axis] as f64);
-    let mut at = [0, 1].map(|axis| domain[axis][0] + steps[axis] * start[axis] as f64);
-    let mut best = value(at);
-    for shorter in [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125] {
-        for _ in 0..MOST_PASSES {
-            let before_pass = best;
-            for (axis, step) in steps.into_iter().enumerate() {
-                climb_along(form, axis, shorter * step, value, &mut at, &mut best);
-            }
-            if best - before_pass <= SMALL_GAIN * best.abs() {
-                break;
-            }
-        }
-    }
-    (best, at)
-}
-
-/// Smallest step across the centre of a circle, as a part of its radius.
-const SMALLEST_STEP: f64 = 1e-3;
-
-/// From a value and its point in a solid circle to the largest value near it, by steps in eight
-/// directions: near the centre the angle of a point says little. Other shapes keep the point.
-fn cross_centre(form: ClosedForm, start: (f64, Point), value: &dyn Fn(Point) -> f64) -> (f64, Point) {
-    let ClosedShape::Ring { radii: [0.0, radius] } = form.shape else { return start };
-    let (mut best, mut at) = start;
-    let mut step = radius / form.samples()[0] as f64;
-    while step > SMALLEST_STEP * radius {
-        let around = (0..8).map(|k| {
-            let (sin, cos) = libm::sincos(f64::from(k) * std::f64::consts::FRAC_PI_4);
-            [at[0] + step * cos, at[1] + step * sin]
-        });
-        let inside = around.filter(|to| libm::hypot(to[0], to[1]) <= radius);
-        match inside.map(|to| (value(to), to)).max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((found, to)) if found > best => (best, at) = (found, to),
-            Some(_) | None => step *= 0.5,
-        }
-    }
-    (best, at)
-}
-
-/// From a point of a closed form, with its value, to a larger value along one coordinate: the top of
-/// the parabola through it and both neighbours at a distance of `step`, or one of these.
-fn climb_along(
-    form: ClosedForm,
-    axis: usize,
-    step: f64,
-    value: &dyn Fn([f64; 2]) -> f64,
-    at: &mut [f64; 2],
-    best: &mut f64,
-) {
-    let domain = form.domain();
-    let start = *at;
-    let moved = |by: f64| {
-        let mut to = start;
-        to[axis] += by;
-        // A radius below zero is one on the other side of the centre.
-        let [low, high] = if axis == 0 && domain[0][0] == 0.0 { [-domain[0][1], domain[0][1]] } else { domain[axis] };
-        let is_inside = low <= to[axis] && to[axis] <= high;
-        (is_inside || form.is_closed(axis)).then(|| (value(to), to))
-    };
-    let (Some(before), Some(behind)) = (moved(-step), moved(step)) else { return };
-    let bend = before.0 - 2.0 * *best + behind.0;
-    let turn = if bend < 0.0 { 0.5 * step * (before.0 - behind.0) / bend } else { 0.0 };
-    let tops = [Some(before), Some(behind), moved(turn.clamp(-step, step))];
-    for (found, to) in tops.into_iter().flatten() {
-        if found > *best {
-            (*best, *at) = (found, to);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::closed::ClosedShape;
     use super::*;
     use std::f64::consts::PI;
 
     fn ring(inner: f64) -> Recovery {
-        let form = ClosedForm { shape: ClosedShape::Ring { radii: [inner, 1.0] }, nu: 0.3 };
+        let form = ClosedForm::new(ClosedShape::Ring { radii: [inner, 1.0] }, 0.3);
         Recovery::closed("ring", form, Placement::default(), None)
     }
 
@@ -519,7 +495,7 @@ mod tests {
             ClosedShape::Rectangle { half: [0.5, 1.0] },
         ];
         for (number, shape) in shapes.into_iter().enumerate() {
-            let form = ClosedForm { shape, nu: 0.3 };
+            let form = ClosedForm::new(shape, 0.3);
             let section = Recovery::closed("s", form, Placement::default(), None);
             let [[u0, u1], [v0, v1]] = form.domain();
             let fine: Vec<Matrix6> = (0..=60)
@@ -544,7 +520,7 @@ mod tests {
 
     #[test]
     fn a_section_beside_the_line_sees_moments_about_its_origin() {
-        let form = ClosedForm { shape: ClosedShape::Rectangle { half: [1.0, 2.0] }, nu: 0.3 };
+        let form = ClosedForm::new(ClosedShape::Rectangle { half: [1.0, 2.0] }, 0.3);
         let section = Arc::new(Recovery::closed("s", form, Placement::default(), None));
         // Tension along the line bends a section that lies above it, and pulls most at its lower side.
         let pulled = Vector6::ith(0, 1.0);
@@ -562,7 +538,7 @@ mod tests {
 
     #[test]
     fn offset_and_turn_of_a_beam_are_those_of_a_section() {
-        let form = ClosedForm { shape: ClosedShape::Rectangle { half: [1.0, 2.0] }, nu: 0.3 };
+        let form = ClosedForm::new(ClosedShape::Rectangle { half: [1.0, 2.0] }, 0.3);
         let turn = 0.4;
         let own = Arc::new(Recovery::closed("s", form, Placement::default(), None));
         let placement = Placement::beside([0.7, -0.2], turn);
@@ -578,7 +554,7 @@ mod tests {
 
     #[test]
     fn a_turned_section_sees_turned_resultants() {
-        let form = ClosedForm { shape: ClosedShape::Rectangle { half: [1.0, 2.0] }, nu: 0.3 };
+        let form = ClosedForm::new(ClosedShape::Rectangle { half: [1.0, 2.0] }, 0.3);
         let turn = Placement { turn: 0.5 * PI, ..Placement::default() };
         let section = Recovery::closed("s", form, turn, None);
         // Depth 4 of the shape now lies along -2 of the beam: a moment about 3 bends it the strong way.

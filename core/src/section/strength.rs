@@ -74,6 +74,11 @@ impl FailureLaw {
         Self { fibre_strain: Some(material.compliance().row(0).transpose() / limit), ..self }
     }
 
+    /// True if only von Mises stress counts.
+    pub fn is_yield_alone(&self) -> bool {
+        self.strengths.is_none() && self.fibre_strain.is_none()
+    }
+
     /// The index of a stress in material axes.
     pub fn index(&self, stress: &Vector6) -> f64 {
         let yielding = self.yield_stress.map_or(0.0, |limit| von_mises(stress) / limit);

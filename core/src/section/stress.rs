@@ -5,11 +5,10 @@
 
 use super::element::SectionPoint;
 use super::error::SectionError;
-use super::material::{Material, material_axes, stress_in_material_axes, tensor};
+use super::material::{Material, material_axes, stress_in_material_axes};
 use super::mesh::{Element, Mesh};
 use super::saint_venant::{Solution, StiffnessField};
 use super::{Matrix6, Point, Vector6};
-use nalgebra::SymmetricEigen;
 use std::collections::HashMap;
 
 /// Steps of Newton's method for the place of a point in an element
@@ -112,25 +111,6 @@ impl NodalStresses {
         if kept.is_empty() { (0..self.places.len()).collect() } else { kept }
     }
 
-    /// The largest value of a measure of the stress under a load (N1 to M3).
-    pub fn largest(
-        &self,
-        mesh: &Mesh,
-        load: &Vector6,
-        corners: Corners,
-        measure: impl Fn(&Vector6) -> f64,
-    ) -> Option<Peak> {
-        let mut largest: Option<Peak> = None;
-        for index in self.kept(mesh, corners) {
-            let place = self.places[index];
-            let value = measure(&(self.unit[index] * load));
-            if largest.is_none_or(|peak| value > peak.value) {
-                largest = Some(Peak { value, at: mesh.nodes[place.node as usize], region: place.region as usize });
-            }
-        }
-        largest
-    }
-
     /// Mean of a measure of the stress over the nodes of each element under a load (N1 to M3).
     pub fn of_elements(&self, load: &Vector6, measure: impl Fn(&Vector6) -> f64) -> Vec<f64> {
         let of_place = |&place: &u32| measure(&(self.unit[place as usize] * load));
@@ -231,13 +211,6 @@ pub fn von_mises(s: &Vector6) -> f64 {
     (0.5 * normal + 3.0 * shear).sqrt()
 }
 
-/// Principal stresses, the largest first.
-pub fn principal_stresses(s: &Vector6) -> [f64; 3] {
-    let mut values: [f64; 3] = SymmetricEigen::new(tensor(s)).eigenvalues.into();
-    values.sort_by(|a, b| b.total_cmp(a));
-    values
-}
-
 /// The first and the third principal stress, by the trigonometric solution of the cubic equation.
 pub fn extreme_principal_stresses(s: &Vector6) -> [f64; 2] {
     let mean = (s[0] + s[1] + s[2]) / 3.0;
@@ -255,23 +228,25 @@ pub fn extreme_principal_stresses(s: &Vector6) -> [f64; 2] {
     [mean + 2.0 * size * libm::cos(angle), mean + 2.0 * size * libm::cos(angle + 2.0 / 3.0 * std::f64::consts::PI)]
 }
 
-/// The largest shear stress on any plane.
-pub fn largest_shear(s: &Vector6) -> f64 {
-    let [high, _, low] = principal_stresses(s);
-    0.5 * (high - low)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::material::tensor;
     use super::*;
+    use nalgebra::SymmetricEigen;
+
+    /// Principal stresses, the largest first.
+    fn principal_stresses(s: &Vector6) -> [f64; 3] {
+        let mut values: [f64; 3] = SymmetricEigen::new(tensor(s)).eigenvalues.into();
+        values.sort_by(|a, b| b.total_cmp(a));
+        values
+    }
 
     #[test]
     fn measures_of_pure_shear() {
         let s = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 2.0);
         assert!((von_mises(&s) - 2.0 * 3_f64.sqrt()).abs() < 1e-12);
-        let principal = principal_stresses(&s);
-        assert!((principal[0] - 2.0).abs() < 1e-12 && (principal[2] + 2.0).abs() < 1e-12);
-        assert!((largest_shear(&s) - 2.0).abs() < 1e-12);
+        let [first, third] = extreme_principal_stresses(&s);
+        assert!((first - 2.0).abs() < 1e-12 && (third + 2.0).abs() < 1e-12);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Sections with published or closed-form results that are not among the reference cases.
 
+use super::largest;
 use beamsim_core::section::analysis::{Analysis, DEFAULT_AIM, MeshAim, Reference, analyse};
 use beamsim_core::section::geometry::{Geometry, Profile, Shape};
 use beamsim_core::section::grid::Rect;
@@ -129,7 +130,7 @@ fn composite_pipe_of_vabs() {
     let digest =
         [(0.325, -0.2432, 0.0690), (0.375, -0.2772, 0.1963), (0.425, -4.693, -0.1046), (0.475, -5.243, -0.1107)];
     for (x3, s11, s22) in digest {
-        let probes = stresses.probe(&analysis.mesh, [0.0, x3]);
+        let probes = stresses.nodal.probe(&stresses.mesh, [0.0, x3]);
         let stress = probes[0].stress(&load) * 1e-3;
         println!("x3 {x3}: s11 {:.4} ({s11}), s22 {:.4} ({s22})", stress[0], stress[1]);
         assert!((stress[0] - s11).abs() < 1e-3 && (stress[1] - s22).abs() < 3e-4);
@@ -235,10 +236,10 @@ fn stresses_converge_to_exact_ones() {
     let stresses = analysis.stresses(&unit_material()).unwrap();
     let load = Vector6::ith(2, 1.0);
     let inertia = PI / 4.0;
-    let at = |at: [f64; 2]| stresses.probe(&analysis.mesh, at)[0].stress(&load);
+    let at = |at: [f64; 2]| stresses.nodal.probe(&stresses.mesh, at)[0].stress(&load);
     assert_near(at([0.0, 0.0])[4], 3.6 / 10.4 / inertia, 2e-3, "centre");
     assert_near(at([1.0, 0.0])[4], 1.6 / 5.2 / inertia, 1e-3, "side");
-    let peak = stresses.largest(&analysis.mesh, &load, Corners::Exclude, von_mises).unwrap();
+    let peak = largest(stresses, &load, Corners::Exclude, von_mises);
     assert!(peak.at[0].hypot(peak.at[1]) < 0.05, "{peak:?}");
 }
 
@@ -250,7 +251,7 @@ fn largest_stress_away_from_corners_does_not_depend_on_the_mesh() {
     let peak = |aim: f64, corners: Corners| {
         let analysis = run(&geometry, &materials, aim);
         let stresses = analysis.stresses(&materials).unwrap();
-        stresses.largest(&analysis.mesh, &load, corners, von_mises).unwrap().value
+        largest(stresses, &load, corners, von_mises).value
     };
     let outside = [1e-3, 1e-5].map(|aim| peak(aim, Corners::Exclude));
     let inside = [1e-3, 1e-5].map(|aim| peak(aim, Corners::Include));
@@ -573,10 +574,10 @@ fn reference_points_move_loads_too() {
     let stresses = analysis.stresses(&unit_material()).unwrap();
     let load = analysis.load_of(&Vector6::ith(0, 1.0), at);
     // Tension through the tension centre is uniform.
-    for (place, unit) in stresses.places.iter().zip(&stresses.unit) {
+    for (place, unit) in stresses.nodal.places.iter().zip(&stresses.nodal.unit) {
         let stress = unit * load;
         let error = (stress[0] * analysis.solution.area - 1.0).abs();
-        assert!(error < 1e-9, "{:?} {error:e}", analysis.mesh.nodes[place.node as usize]);
+        assert!(error < 1e-9, "{:?} {error:e}", stresses.mesh.nodes[place.node as usize]);
     }
     assert!(analysis.warnings().is_empty());
 }

@@ -41,6 +41,7 @@ enum FieldKind {
     Force,
     Moment,
     EnergyPerLength,
+    Stress,
 }
 
 impl FieldKind {
@@ -49,6 +50,7 @@ impl FieldKind {
         match self {
             Self::Force | Self::EnergyPerLength => units.force(),
             Self::Moment => units.moment(),
+            Self::Stress => units.stress(),
         }
     }
 }
@@ -57,7 +59,10 @@ const fn field(name: &'static str, label: &'static str, kind: FieldKind) -> Fiel
     Field { name, label, kind }
 }
 
-const FIELDS: [Field; 7] = [
+/// Fields of a node
+const FIELD_COUNT: usize = 8;
+
+const FIELDS: [Field; FIELD_COUNT] = [
     field("N1", "axial force N1", FieldKind::Force),
     field("N2", "shear force N2", FieldKind::Force),
     field("N3", "shear force N3", FieldKind::Force),
@@ -65,6 +70,7 @@ const FIELDS: [Field; 7] = [
     field("M2", "bending moment M2", FieldKind::Moment),
     field("M3", "bending moment M3", FieldKind::Moment),
     field("energy", "strain energy per length", FieldKind::EnergyPerLength),
+    field("vm", "largest von Mises stress", FieldKind::Stress),
 ];
 
 /// Watches a run.
@@ -117,7 +123,7 @@ struct Frame {
     row: usize,
     places: Vec<[f32; 3]>,
     turns: Vec<[i16; 4]>,
-    fields: Vec<[f32; 7]>,
+    fields: Vec<[f32; FIELD_COUNT]>,
     /// Rotation by rows and shift of each surface
     poses: Vec<[f32; 12]>,
     /// Place and force of each contact point
@@ -182,13 +188,15 @@ impl Film {
 
     fn frame(&self, row: usize, state: &State, origin: Option<&State>) -> Frame {
         let looks = self.figure.looks(state, origin);
-        let of = || self.shown.iter().flatten().map(|&k| &looks[k]);
+        let stress = self.stress(&looks);
+        let numbers = || self.shown.iter().flatten().copied();
+        let of = || numbers().map(|k| &looks[k]);
         let contacts = &self.figure.contacts;
         Frame {
             row,
             places: of().map(|look| look.place.0.map(|x| x as f32)).collect(),
             turns: of().map(|look| quaternion(look.axes)).collect(),
-            fields: of().map(fields).collect(),
+            fields: numbers().map(|k| fields(&looks[k], stress[k])).collect(),
             poses: self.surfaces().iter().map(|surface| pose(surface, state)).collect(),
             forces: contacts.iter().flat_map(|contacts| contacts.forces(state)).map(force).collect(),
         }
@@ -197,6 +205,20 @@ impl Film {
     /// The surfaces of the scene.
     fn surfaces(&self) -> &[SceneSurface] {
         self.figure.contacts.as_ref().map_or(&[], |contacts| &contacts.surfaces)
+    }
+
+    /// Largest von Mises stress of the section at each node. Between nodes where it is known it is
+    /// linear, as far as pictures go; zero where nothing of a beam is known.
+    fn stress(&self, looks: &[Look]) -> Vec<f64> {
+        let Some(mut all) = self.figure.von_mises(looks) else { return vec![0.0; looks.len()] };
+        let mut first = 0;
+        for line in &self.figure.lines {
+            let fractions: Vec<f64> = line.points.iter().map(|point| point.inside.fraction).collect();
+            fill_gaps(&fractions, &mut all[first..first + line.points.len()]);
+            first += line.points.len();
+        }
+        all[first..].fill(0.0);
+        all
     }
 
     /// Drops every other frame where there are too many.
@@ -347,9 +369,26 @@ fn at_row(event: &FilmEvent, row: &dyn Fn(usize) -> usize) -> Value {
     json!({ "row": row(*of), "kind": kind, "text": text })
 }
 
-fn fields(look: &Look) -> [f32; 7] {
+fn fields(look: &Look, stress: f64) -> [f32; FIELD_COUNT] {
     let [n1, n2, n3, m1, m2, m3] = look.resultant;
-    [n1, n2, n3, m1, m2, m3, look.energy].map(|x| x as f32)
+    [n1, n2, n3, m1, m2, m3, look.energy, stress].map(|x| x as f32)
+}
+
+/// Replaces values that are no numbers: linear between those that are, and the next one at the ends.
+fn fill_gaps(places: &[f64], values: &mut [f64]) {
+    let known: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_nan()).collect();
+    for k in (0..values.len()).filter(|k| !known.contains(k)).collect::<Vec<_>>() {
+        let next = known.partition_point(|&other| other < k);
+        let before = next.checked_sub(1).map(|at| known[at]);
+        values[k] = match (before, known.get(next)) {
+            (None, None) => 0.0,
+            (Some(only), None) | (None, Some(&only)) => values[only],
+            (Some(a), Some(&b)) => {
+                let part = (places[k] - places[a]) / (places[b] - places[a]);
+                values[a] + part * (values[b] - values[a])
+            }
+        };
+    }
 }
 
 /// The nodes of each beam that are shown: all, or each n-th, the ends and those with names; then the bodies; then the
@@ -424,6 +463,16 @@ fn quaternion(axes: Mat3) -> [i16; 4] {
 mod tests {
     use super::*;
     use beamsim_core::rotation::Rotation;
+
+    #[test]
+    fn gaps_are_filled_from_both_sides() {
+        let mut values = [f64::NAN, 2.0, f64::NAN, 4.0, f64::NAN];
+        fill_gaps(&[0.0, 1.0, 1.5, 2.0, 3.0], &mut values);
+        assert_eq!(values, [2.0, 2.0, 3.0, 4.0, 4.0]);
+        let mut none = [f64::NAN; 2];
+        fill_gaps(&[0.0, 1.0], &mut none);
+        assert_eq!(none, [0.0; 2]);
+    }
 
     #[test]
     fn quaternions_are_those_of_their_rotation_vectors() {

@@ -16,6 +16,7 @@
 use super::cone::Cone;
 use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, Undefined, sphere};
 use super::minimum::{Slopes, interior_minima};
+use crate::kernel::spline::cubics;
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 
@@ -160,13 +161,16 @@ impl Tube {
         let value = |k: usize, point: usize| if k < 3 { points[point].0[k] } else { radii[point] };
         let component = |k: usize| {
             let values: Vec<f64> = (0..points.len()).map(|point| value(k, point)).collect();
-            natural_spline(&chords, &values)
+            cubics(&values, &chords, None)
         };
         let components = [component(0), component(1), component(2), component(3)];
         let mut least_radius = f64::INFINITY;
         let mut pieces = vec![];
         for k in 0..chords.len() {
-            let piece = Piece::new([0, 1, 2, 3].map(|of: usize| components[of][k]));
+            // From u in [0, chord] to u in [0, 1].
+            let scales = [1.0, chords[k], chords[k].powi(2), chords[k].powi(3)];
+            let scaled = |of: usize| [0, 1, 2, 3].map(|power: usize| components[of][k][power] * scales[power]);
+            let piece = Piece::new([0, 1, 2, 3].map(scaled));
             least_radius = least_radius.min(piece.examine(k)?);
             pieces.push(piece);
         }
@@ -344,34 +348,4 @@ fn check_points(points: &[Vec3], radii: &[f64]) -> Result<(), TubeError> {
         Some(k) => Err(TubeError::Radius(k)),
         None => Ok(()),
     }
-}
-
-/// The natural cubic spline through `values` with intervals of lengths `h`: for each interval the
-/// coefficients of 1, u, u^2, u^3, u in [0, 1]. Its second derivatives m solve
-///
-/// ```text
-/// h_{k-1} m_{k-1} + 2 (h_{k-1} + h_k) m_k + h_k m_{k+1} = 6 (d_k - d_{k-1}),  d_k = (v_{k+1}-v_k)/h_k
-/// ```
-///
-/// with m = 0 at both ends.
-fn natural_spline(h: &[f64], values: &[f64]) -> Vec<[f64; 4]> {
-    let count = h.len();
-    let chord = |k: usize| (values[k + 1] - values[k]) / h[k];
-    let mut factor = vec![0.0; count + 1];
-    let mut second = vec![0.0; count + 1];
-    for k in 1..count {
-        let pivot = 2.0 * (h[k - 1] + h[k]) - h[k - 1] * factor[k - 1];
-        factor[k] = h[k] / pivot;
-        second[k] = (6.0 * (chord(k) - chord(k - 1)) - h[k - 1] * second[k - 1]) / pivot;
-    }
-    for k in (1..count).rev() {
-        second[k] -= factor[k] * second[k + 1];
-    }
-    let piece = |k: usize| {
-        let square = h[k] * h[k] / 6.0;
-        let rise = values[k + 1] - values[k];
-        let first = rise - square * (2.0 * second[k] + second[k + 1]);
-        [values[k], first, 3.0 * square * second[k], square * (second[k + 1] - second[k])]
-    };
-    (0..count).map(piece).collect()
 }

@@ -1,6 +1,6 @@
-//! The deck of a blade of BeamDyn.
+//! The deck of a blade of BeamDyn or windIO.
 
-use super::beamdyn::{Blade, BladeStation, Driver, KeyPoint};
+use super::beamdyn::{Blade, BladeStation, Driver, KeyPoint, Origin};
 use super::deck_text::{Imported, comment, list, number, quoted, wrapped};
 use crate::scene::{NaturalSpline, Spline};
 use beamsim_core::tensor::Vec3;
@@ -24,7 +24,7 @@ const LONGEST_ELEMENT: f64 = 1.0 / 16.0;
 const SAMPLES: usize = 4;
 
 /// The deck of a blade that is clamped at its root: with the loads of a driver, or with its modes.
-pub fn beamdyn_deck(blade: &Blade, driver: Option<&Driver>) -> Imported {
+pub fn blade_deck(blade: &Blade, driver: Option<&Driver>) -> Imported {
     let axis = Axis::new(blade);
     let places = places(blade, &axis, driver);
     let mut text = String::new();
@@ -50,7 +50,13 @@ pub fn beamdyn_deck(blade: &Blade, driver: Option<&Driver>) -> Imported {
     match driver {
         Some(driver) => loads(&mut text, blade, driver, &axis, &places),
         None => {
-            text += "# The modes of the clamped blade. With a driver file there are its loads instead.\n[[stage]]\nkind = \"modal\"\nmodes = 10\n"
+            text += match blade.origin {
+                Origin::BeamDyn => {
+                    "# The modes of the clamped blade. With a driver file there are its loads instead.\n"
+                }
+                Origin::WindIo => "# The modes of the clamped blade.\n",
+            };
+            text += "[[stage]]\nkind = \"modal\"\nmodes = 10\n";
         }
     }
     Imported { deck: text, notes }
@@ -242,17 +248,20 @@ fn station(blade: &Blade, fraction: f64) -> Station {
 
 fn head(text: &mut String, blade: &Blade, driver: Option<&Driver>, notes: &[String]) {
     let _ = writeln!(text, "#:schema beamsim.schema.json");
-    let _ = writeln!(
-        text,
-        "# From files of BeamDyn: {} (key points), {} (sections)",
-        comment(&blade.primary),
-        comment(&blade.file)
-    );
+    let _ = match blade.origin {
+        Origin::BeamDyn => writeln!(
+            text,
+            "# From files of BeamDyn: {} (key points), {} (sections)",
+            comment(&blade.primary),
+            comment(&blade.file)
+        ),
+        Origin::WindIo => writeln!(text, "# From a file of windIO: the blade (six_x_six) of {}", comment(&blade.file)),
+    };
     if let Some(driver) = driver {
         let _ = writeln!(text, "# and {} (loads)", comment(&driver.file));
     }
     *text += "#\n# Global axes are those of the root frame of the blade. Local axes 1, 2, 3 are z, x, y of its sections, so that\n\
-              # rows x y z x y z of its matrices are rows 2 3 1 2 3 1 here. The twist of BeamDyn is about -z.\n";
+              # rows x y z x y z of its matrices are rows 2 3 1 2 3 1 here. The twist of the file is about -z.\n";
     for note in notes {
         let _ = writeln!(text, "# {}", comment(note));
     }
