@@ -173,6 +173,11 @@ fn stations(yaml: &Yaml, six: &Node, stiffness: &Matrices, mass: &Matrices) -> R
         let (stiffness, line) = stiffness.at(eta);
         let (mass, _) = mass.at(eta);
         let wrong = |why: String| yaml.error(six, format!("the {why} (at {eta}, line {line})"));
+        if stiffness[(1, 1)] == 0.0 || stiffness[(2, 2)] == 0.0 {
+            let why = "shear stiffness of a station is zero, as in files of PreComp: give its entries 1 and 7, or import the \
+                       BeamDyn files of the blade";
+            return Err(wrong(why.into()));
+        }
         if stiffness.cholesky().is_none() {
             return Err(wrong("stiffness of a station is not positive definite".into()));
         }
