@@ -1,6 +1,6 @@
 //! The laws of a contact, and bounds that surfaces and pairs of beams share.
 
-use crate::kernel::contact::{CarriedTraction, NormalLaw};
+use crate::kernel::contact::{CarriedTraction, FrictionLaw};
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
@@ -30,9 +30,11 @@ pub struct ContactLaws {
 
 impl ContactLaws {
     /// The memory of friction at an accepted point. A point that barely touches has none: the
-    /// direction of its traction is that of round-off.
-    pub(super) fn carried(&self, normal: &NormalLaw, force: f64, now: CarriedTraction) -> CarriedTraction {
-        let barely = TOUCHING * self.penetration * normal.stiffness();
+    /// direction of its traction is that of round-off. The bound follows the first stiffness, not
+    /// that of the last augmentation, which a heavier contact may have raised.
+    pub(super) fn carried(&self, friction: Option<&FrictionLaw>, force: f64, now: CarriedTraction) -> CarriedTraction {
+        let first_stiffness = friction.map_or(0.0, |friction| friction.stiffness / self.stick);
+        let barely = TOUCHING * self.penetration * first_stiffness;
         if force > barely { now } else { CarriedTraction { normal: now.normal, ..CarriedTraction::default() } }
     }
 

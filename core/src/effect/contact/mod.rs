@@ -355,7 +355,7 @@ impl<'a> ChainNow<'a> {
         let rotation = &self.carrier.rotation.r;
         let carried = if accepts {
             let now = CarriedTraction { force: state.traction.force, normal: state.normal, slides };
-            self.laws.carried(&law.normal, state.normal_force.force, now)
+            self.laws.carried(law.friction.as_ref(), state.normal_force.force, now)
         } else {
             law.carried
         };

@@ -53,25 +53,33 @@ pub(super) fn force_along(chains: &[Chain], beam: usize, fraction: f64, at: &Sta
 }
 
 fn force_of_chain(chain: &Chain, points: &[PointMemory], along: f64) -> [f64; 2] {
-    let per_length = |point: &PointMemory| {
-        let share = chain.share(point.place);
-        [point.force / share, point.traction.norm() / share]
-    };
-    let next = points.partition_point(|point| point.place < along);
     let width = 1.0 / chain.order as f64;
-    let near = |point: &&PointMemory| (point.place - along).abs() < width;
-    let before = next.checked_sub(1).and_then(|k| points.get(k)).filter(near);
-    let after = points.get(next).filter(near);
-    match (before, after) {
-        (Some(a), Some(b)) => {
-            let part = (along - a.place) / (b.place - a.place);
-            let [a, b] = [per_length(a), per_length(b)];
+    let next = points.partition_point(|point| point.place < along);
+    let nearest = [next.checked_sub(1), Some(next)];
+    let [before, after] = nearest.map(|number| place_and_force(chain, points, number));
+    let is_near = |point: &(f64, [f64; 2])| (point.0 - along).abs() < width;
+    match (before.filter(is_near), after.filter(is_near)) {
+        (Some((from, a)), Some((to, b))) => {
+            let part = (along - from) / (to - from);
             [0, 1].map(|k| a[k] + (b[k] - a[k]) * part)
         }
-        (Some(point), None) | (None, Some(point)) => {
-            let part = 1.0 - (point.place - along).abs() / width;
-            per_length(point).map(|force| force * part)
+        (Some((place, force)), None) | (None, Some((place, force))) => {
+            let part = 1.0 - (place - along).abs() / width;
+            force.map(|force| force * part)
         }
         (None, None) => [0.0; 2],
     }
+}
+
+/// The place of a point, and its forces per length. Before the first and after the last one a ring
+/// goes on with the points of its other end.
+fn place_and_force(chain: &Chain, points: &[PointMemory], number: Option<usize>) -> Option<(f64, [f64; 2])> {
+    let round = if chain.is_closed() { chain.elements() as f64 } else { 0.0 };
+    let (point, shift) = match number {
+        Some(number) if number < points.len() => (&points[number], 0.0),
+        Some(_) => (points.first().filter(|_| chain.is_closed())?, round),
+        None => (points.last().filter(|_| chain.is_closed())?, -round),
+    };
+    let share = chain.share(point.place);
+    Some((point.place + shift, [point.force / share, point.traction.norm() / share]))
 }

@@ -397,7 +397,7 @@ impl<'a> PairsNow<'a> {
         let carried = if accepts {
             let slides = state.status() == Status::Slides;
             let now = CarriedTraction { force: point.traction(), normal, slides };
-            self.laws[self.pairs.contact_of(pair.meeting as usize)].carried(&law.normal, force, now)
+            self.laws[self.pairs.contact_of(pair.meeting as usize)].carried(law.friction.as_ref(), force, now)
         } else {
             known
         };
