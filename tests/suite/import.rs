@@ -266,7 +266,11 @@ fn wrong_turbines_are_refused_at_their_place() {
         ),
         ("stiff_matrix:", "stiffness:", "there is no `stiff_matrix` here"),
         ("-  [972948000.0, ", "-  [", "a matrix has the 21 entries of its upper triangle by rows, found 20"),
-        ("-  [972948000.0, ", "-  [-972948000.0, ", "the stiffness of a station is not positive definite (at 0.0"),
+        (
+            "-  [972948000.0, ",
+            "-  [-972948000.0, ",
+            "the stiffness of a station is not positive definite (at 0, line 27)",
+        ),
         ("-  [972948000.0, ", "-  [0.0, ", "the shear stiffness of a station is zero, as in files of PreComp"),
         ("-  [972948000.0, ", "-  [1e9l, ", "a matrix of `stiff_matrix` must be numbers"),
         ("-  [678.935, ", "-  [700.0, ", "mass of a station differs by direction"),
