@@ -3,7 +3,7 @@
 
 use super::lines::ImportError;
 use saphyr_parser::{Event, Parser, ScanError, Span};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 /// Lists and maps within one another, at most
@@ -15,6 +15,8 @@ pub struct Node {
     /// Line and column from 1
     at: [usize; 2],
     value: Value,
+    /// Lists and maps within one another, aliases included
+    depth: usize,
 }
 
 #[derive(Debug)]
@@ -31,6 +33,10 @@ struct Open {
     value: Value,
     /// The key whose value comes next
     key: Option<String>,
+    /// All keys so far
+    keys: HashSet<String>,
+    /// The depth of the deepest node in it
+    depth: usize,
 }
 
 /// A file of YAML.
@@ -40,15 +46,12 @@ pub struct Yaml<'t> {
 }
 
 impl<'t> Yaml<'t> {
-    /// Reads the first document of the text of a file with this name.
+    /// Reads the document that is the text of a file with this name.
     pub fn new(file: &'t str, text: &str) -> Result<Self, ImportError> {
         let mut tree = Tree { file, open: Vec::new(), anchors: HashMap::new(), root: None };
         let mut parser = Parser::new_from_str(text);
-        while tree.root.is_none() {
-            let (event, span) = match parser.next_event() {
-                None => break,
-                Some(found) => found.map_err(|error| scan_error(file, &error))?,
-            };
+        while let Some(found) = parser.next_event() {
+            let (event, span) = found.map_err(|error| scan_error(file, &error))?;
             tree.take(event, span)?;
         }
         let empty = || ImportError { file: file.into(), at: None, message: "this file of YAML is empty".into() };
@@ -132,6 +135,7 @@ impl Tree<'_> {
     fn take(&mut self, event: Event, span: Span) -> Result<(), ImportError> {
         let at = place(span);
         match event {
+            Event::DocumentStart(_) if self.root.is_some() => Err(self.error(at, "a second document begins here")),
             Event::Nothing | Event::StreamStart | Event::StreamEnd | Event::DocumentStart(_) | Event::DocumentEnd => {
                 Ok(())
             }
@@ -139,10 +143,12 @@ impl Tree<'_> {
             Event::MappingStart(anchor, _) => self.begin(anchor, at, Value::Map(Vec::new())),
             Event::SequenceEnd | Event::MappingEnd => match self.open.pop() {
                 None => Ok(()),
-                Some(Open { anchor, at, value, .. }) => self.add(anchor, Rc::new(Node { at, value })),
+                Some(Open { anchor, at, value, depth, .. }) => {
+                    self.add(anchor, Rc::new(Node { at, value, depth: depth + 1 }))
+                }
             },
             Event::Scalar(text, _, anchor, _) => {
-                self.add(anchor, Rc::new(Node { at, value: Value::Scalar(text.into_owned()) }))
+                self.add(anchor, Rc::new(Node { at, value: Value::Scalar(text.into_owned()), depth: 0 }))
             }
             Event::Alias(anchor) => match self.anchors.get(&anchor).cloned() {
                 Some(node) => self.add(0, node),
@@ -153,9 +159,9 @@ impl Tree<'_> {
 
     fn begin(&mut self, anchor: usize, at: [usize; 2], value: Value) -> Result<(), ImportError> {
         if self.open.len() == DEEPEST {
-            return Err(self.error(at, &format!("more than {DEEPEST} lists and maps within one another")));
+            return Err(self.too_deep(at));
         }
-        self.open.push(Open { anchor, at, value, key: None });
+        self.open.push(Open { anchor, at, value, key: None, keys: HashSet::new(), depth: 0 });
         Ok(())
     }
 
@@ -164,10 +170,14 @@ impl Tree<'_> {
         if anchor > 0 {
             self.anchors.insert(anchor, node.clone());
         }
-        let Some(Open { value, key, .. }) = self.open.last_mut() else {
+        if node.depth > DEEPEST {
+            return Err(self.too_deep(node.at));
+        }
+        let Some(Open { value, key, keys, depth, .. }) = self.open.last_mut() else {
             self.root = Some(node);
             return Ok(());
         };
+        *depth = node.depth.max(*depth);
         match value {
             Value::List(items) => items.push(node),
             Value::Map(entries) => match key.take() {
@@ -175,7 +185,10 @@ impl Tree<'_> {
                 None => {
                     let name = node.text().map(str::to_string);
                     let Some(name) = name else { return Err(self.error(node.at, "a key must be a word")) };
-                    if entries.iter().any(|(known, _)| *known == name) {
+                    if name == "<<" {
+                        return Err(self.error(node.at, "merge keys (`<<`) are not supported: write the keys here"));
+                    }
+                    if !keys.insert(name.clone()) {
                         return Err(self.error(node.at, &format!("the key `{name}` is given twice")));
                     }
                     *key = Some(name);
@@ -184,6 +197,10 @@ impl Tree<'_> {
             Value::Scalar(_) => {}
         }
         Ok(())
+    }
+
+    fn too_deep(&self, at: [usize; 2]) -> ImportError {
+        self.error(at, &format!("more than {DEEPEST} lists and maps within one another"))
     }
 
     fn error(&self, at: [usize; 2], message: &str) -> ImportError {
@@ -228,10 +245,14 @@ mod tests {
             ("a: &b [*b]\n", "a.yaml:1:8: this alias names a part that has not ended yet"),
             ("", "a.yaml: this file of YAML is empty"),
             ("? [1]\n: 2\n", "a.yaml:1:3: a key must be a word"),
+            ("a: [1]\n---\na: [2]\n", "a.yaml:2:1: a second document begins here"),
+            ("b: &b {a: [1]}\n<<: *b\n", "a.yaml:2:1: merge keys (`<<`) are not supported: write the keys here"),
         ] {
             assert_eq!(numbers(text, &["a"]).unwrap_err(), message, "{text}");
         }
         let deep = "[".repeat(100_000);
         assert!(numbers(&deep, &["a"]).unwrap_err().contains("within one another"));
+        let by_aliases = (0..100_000).map(|k| format!("- &a{} [*a{k}]\n", k + 1)).collect::<String>();
+        assert!(numbers(&format!("- &a0 [1]\n{by_aliases}"), &["a"]).unwrap_err().contains("within one another"));
     }
 }

@@ -147,7 +147,8 @@ impl ResultFolder {
         record.files = names.iter().map(|name| self.listed(name)).collect::<Result<_, _>>()?;
         self.write_over(RECORD, record.to_string().as_bytes())?;
         // Where no files of a run before are removed, a crash leaves new ones, or none.
-        if tables().chain([RECORD]).any(|name| fs::symlink_metadata(self.path.join(name)).is_ok()) {
+        let of_runs = tables().chain([RECORD, CHECKPOINT, "report.html"]).chain(INDICES);
+        if of_runs.into_iter().any(|name| fs::symlink_metadata(self.path.join(name)).is_ok()) {
             sync(&self.path);
         }
         give_names(&self.path, record)

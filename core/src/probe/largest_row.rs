@@ -85,6 +85,7 @@ impl LargestRow {
         self.count += 1;
         let Some(best) = &self.best else {
             self.best = search.look(number, row);
+            self.floor = self.best.map_or(0.0, |best| best.extreme.value);
             return;
         };
         let limit = self.limit();

@@ -376,8 +376,8 @@ fn fields(look: &Look, stress: f64) -> [f32; FIELD_COUNT] {
 
 /// Replaces values that are no numbers: linear between those that are, and the next one at the ends.
 fn fill_gaps(places: &[f64], values: &mut [f64]) {
-    let known: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_nan()).collect();
-    for k in (0..values.len()).filter(|k| !known.contains(k)).collect::<Vec<_>>() {
+    let (gaps, known): (Vec<usize>, Vec<usize>) = (0..values.len()).partition(|&k| values[k].is_nan());
+    for k in gaps {
         let next = known.partition_point(|&other| other < k);
         let before = next.checked_sub(1).map(|at| known[at]);
         values[k] = match (before, known.get(next)) {

@@ -307,7 +307,13 @@ impl<'a> Search<'a> {
 
     /// Decides by the end of the own run of a round; `first` is true while no error is known.
     fn after_own_run(&mut self, round: &Round, own: &Trial, first: bool, pool: &Pool) -> Result<Next, StudyError> {
-        match FailureKind::of(&own.status) {
+        use FailureKind::{ContactStart, Deck, Limit, Singular};
+        let failed = FailureKind::of(&own.status);
+        if self.family.scheme.is_some() && matches!(failed, Some(Singular | Deck | ContactStart | Limit)) {
+            self.leave_lobatto();
+            return Ok(Next::Another);
+        }
+        match failed {
             // This fails on every mesh.
             Some(FailureKind::Singular) if first => {
                 let again = || Failure::Limit("the first run of the search ended with `singular`".into());
