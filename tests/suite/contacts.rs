@@ -573,3 +573,49 @@ fn a_contact_that_has_ended_has_no_forces() {
     let (points, last) = (simulation.column("push.points"), forces.len() - 1);
     assert_eq!((forces[last], points[last]), (0.0, 0.0));
 }
+
+/// A ball that springs hold is pushed against a box beside the middle of a face, in levels that are longer than the
+/// box is thick: no level comes out on another side.
+#[test]
+fn a_ball_does_not_go_through_the_edge_of_a_box() {
+    for place in [[0.0, 0.0], [0.0, 0.3], [0.1, 0.1], [0.2, 0.1], [0.45, 0.0]] {
+        let [y, z] = place;
+        let text = format!(
+            r#"
+[point]
+ball = [0.65, {y}, {z}]
+centre = [0, 0, 0]
+[[body]]
+at = "ball"
+mass = 1
+inertia = [0.01, 0.01, 0.01]
+[[spring]]
+at = "ball"
+stiffness = [1, 1, 1, 1, 1, 1]
+[[load]]
+at = "ball"
+force = [-3, 0, 0]
+[[surface]]
+name = "box"
+kind = "box"
+at = "centre"
+half = [0.5, 0.5, 0.5]
+[[contact]]
+name = "c"
+nodes = ["ball"]
+surfaces = ["box"]
+radius = 0.1
+stiffness = 100
+[[stage]]
+kind = "static"
+steps = 4
+[output]
+nodes = ["ball"]
+columns = ["u", "contact"]
+"#
+        );
+        let simulation = simulate(&text);
+        let [moved, force] = ["ball.ux", "c.normal"].map(|column| simulation.end(column));
+        assert!((moved + 0.05).abs() < 1e-3 && (force - 2.95).abs() < 1e-2, "{place:?}: {moved} {force}");
+    }
+}

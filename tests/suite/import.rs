@@ -274,7 +274,7 @@ fn wrong_turbines_are_refused_at_their_place() {
         ("-  [972948000.0, ", "-  [0.0, ", "the shear stiffness of a station is zero, as in files of PreComp"),
         ("-  [972948000.0, ", "-  [1e9l, ", "a matrix of `stiff_matrix` must be numbers"),
         ("-  [678.935, ", "-  [700.0, ", "mass of a station differs by direction"),
-        ("&span [0.0, ", "&span [0.1, ", "`grid` of the twist must increase from 0 to 1"),
+        ("&span [0.0, ", "&span [0.1, ", "`grid` of `z` of the reference axis must increase from 0 to 1"),
         ("grid: [0.0, 1.0]", "grid: [0.0, 0.5, 1.0]", "`x` of the reference axis has 2 values and 3 places in `grid`"),
         ("*axis", "*axes", "t.yaml:22:33: this is no YAML"),
         (

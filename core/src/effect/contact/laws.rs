@@ -5,6 +5,9 @@ use crate::kernel::contact::{CarriedTraction, FrictionLaw};
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
 
+/// The gap of a point whose force may be round-off, over the largest penetration.
+const BARELY_TOUCHING: f64 = 1e-8;
+
 /// Penetrations that are told exceed the allowed one by this factor.
 pub(super) const ROUNDED: f64 = 1.01;
 
@@ -34,7 +37,7 @@ impl ContactLaws {
     /// that of the last augmentation, which a heavier contact may have raised.
     pub(super) fn carried(&self, friction: Option<&FrictionLaw>, force: f64, now: CarriedTraction) -> CarriedTraction {
         let first_stiffness = friction.map_or(0.0, |friction| friction.stiffness / self.stick);
-        let barely = TOUCHING * self.penetration * first_stiffness;
+        let barely = BARELY_TOUCHING * self.penetration * first_stiffness;
         if force > barely { now } else { CarriedTraction { normal: now.normal, ..CarriedTraction::default() } }
     }
 

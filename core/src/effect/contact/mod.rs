@@ -24,7 +24,7 @@ use super::{
     Roles, TangentForm,
 };
 use crate::kernel::contact::{
-    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Status,
+    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Status, Surface,
     add_point,
 };
 use crate::kernel::{ElementSystem, Weights};
@@ -41,6 +41,9 @@ use std::sync::Arc;
 
 /// Factor of the first stiffness of points that are held in modal stages: about that of elements.
 const HELD: f64 = 1e4;
+
+/// The shortest step on a way that is looked at, over the depth that is looked for.
+const SHORTEST_LOOK: f64 = 0.1;
 
 /// All contacts with rigid surfaces, and of beams with each other.
 #[derive(Clone, Debug, Default)]
@@ -243,6 +246,23 @@ impl SurfaceContacts {
         }
         power
     }
+}
+
+/// True if the straight way between two places, in the axes of a surface, goes deeper into it than
+/// `limit`: whoever is out again at the end of the way may have come out on another side. Steps are
+/// as long as the distance is from the limit, which it cannot pass in a shorter one.
+fn goes_deeper(surface: &Surface, from: Vec3, to: Vec3, limit: f64) -> bool {
+    let way = to - from;
+    let length = way.norm();
+    let mut done = 0.0;
+    while done < length {
+        let Ok(here) = surface.distance(from + way * (done / length)) else { return false };
+        if here.value < -limit {
+            return true;
+        }
+        done += (here.value + limit).max(SHORTEST_LOOK * limit);
+    }
+    false
 }
 
 /// Places, followed by the middles between each two neighbours.
@@ -696,6 +716,13 @@ impl Contacts for SurfaceContacts {
                 [from, to].map(|at| with_middles(chain.seen(&surface.carrier(at, Weights::NONE), at)));
             for (k, (before, after)) in before.iter().zip(&after).enumerate() {
                 let moved = (*after - *before).norm();
+                let limit = chain.radius.min(depth);
+                if moved <= limit {
+                    continue;
+                }
+                if goes_deeper(&surface.surface, *before, *after, limit) {
+                    return Some(chain.nodes[k % chain.nodes.len()].node.u);
+                }
                 if moved <= depth {
                     continue;
                 }
