@@ -156,18 +156,11 @@ fn levels_that_are_cut_give_the_answer_of_small_levels() {
     let dragged = Dragged { friction: 0.3, steps: 64, ..Dragged::random(&mut random) };
     let small = simulate(&dragged.deck());
     // Few corrections are allowed: levels are halved.
-    for (steps, m) in [
-        (1, "max_iterations = 4"),
-        (2, "max_iterations = 3"),
-        (4, "max_iterations = 3"),
-        (2, "max_iterations = 5"),
-        (1, "max_iterations = 6"),
-    ] {
-        let s = attempt(&Dragged { steps, keys: m, ..dragged.clone() }.deck());
-        println!("{steps} {m} {} {:?}", s.counters.cutbacks, s.result.is_ok());
-    }
-    let cut = simulate(&Dragged { steps: 4, keys: "max_iterations = 4", ..dragged }.deck());
-    assert!(cut.counters.cutbacks > 3, "{}", cut.counters.cutbacks);
+    let cut = [5, 4, 3].map(|most| {
+        let keys = format!("max_iterations = {most}");
+        attempt(&Dragged { steps: 4, keys: keys.leak(), ..dragged.clone() }.deck())
+    });
+    let cut = cut.into_iter().find(|run| run.result.is_ok() && run.counters.cutbacks > 3).expect("levels that are cut");
     let [small, cut] = [ends(&small), ends(&cut)];
     println!("{small:?} {cut:?}");
     for (a, b) in small.iter().zip(&cut) {
@@ -267,23 +260,16 @@ fn friction_of_pairs_balances_and_has_its_tangent() {
             assembly.system.right_hand_side(&mut out);
             out
         };
-        for h in [1e-5, 1e-6, 1e-7, 1e-8] {
+        // Differences over a kink between sticking and sliding are none: there a smaller step tells.
+        let error = |h: f64| {
             let (after, before) = (moved(h), moved(-h));
-            let e: Vec<f64> = after.iter().zip(&before).map(|(a, b)| (b - a) / (2.0 * h)).collect();
-            let off = got.iter().zip(&e).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            let one: Vec<f64> = moved(0.0).iter().zip(&before).map(|(a, b)| (b - a) / h).collect();
-            let off1 = got.iter().zip(&one).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            println!("case {case} h {h} off {off:e} one-sided {off1:e}");
-        }
-        let h = 1e-6;
-        let (after, before) = (moved(h), moved(-h));
-        let exact: Vec<f64> = after.iter().zip(&before).map(|(a, b)| (b - a) / (2.0 * h)).collect();
-        let scale = exact.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let off = got.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        worst[1] = worst[1].max(off / scale);
-        if off > 1e-6 * scale {
-            println!("BAD case {case}: {off} of {scale}")
-        }
+            let exact: Vec<f64> = after.iter().zip(&before).map(|(a, b)| (b - a) / (2.0 * h)).collect();
+            let scale = exact.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+            got.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale
+        };
+        let least = [1e-6, 1e-7, 1e-8].map(error).into_iter().fold(f64::INFINITY, f64::min);
+        worst[1] = worst[1].max(least);
+        assert!(least <= 1e-6, "case {case}: {least}");
         touch += 1;
     }
     println!("{touch} touch; balance {:e}, tangent {:e}", worst[0], worst[1]);
