@@ -39,24 +39,24 @@ pub struct RunArguments {
     /// Largest number of threads (default: one per core), for a search and for large scenes;
     /// results do not depend on it
     #[arg(long, value_parser = console::threads, value_name = "N")]
-    pub threads: Option<NonZero<usize>>,
+    pub(super) threads: Option<NonZero<usize>>,
     /// Also write report.html, a page that plays the run back
     #[arg(long)]
     report: bool,
     #[command(flatten)]
-    pub restart: RestartArguments,
+    pub(super) restart: RestartArguments,
 }
 
 /// A deck whose elements and steps are chosen.
 pub struct Chosen {
     /// The deck
-    pub loaded: Loaded,
+    pub(super) loaded: Loaded,
     /// How far the wanted accuracy was reached, where one is wanted
     accuracy: Option<ReachedAccuracy>,
     /// The outputs of the run where the search has run it already
     outcome: Option<Outcome>,
     /// How far the wanted accuracy is missed, as a message, if it is
-    pub missed: Option<String>,
+    pub(super) missed: Option<String>,
 }
 
 impl RunArguments {

@@ -63,13 +63,13 @@ pub enum CommandError {
 #[derive(Debug, Default)]
 pub struct DeckError {
     /// The last line
-    pub message: String,
+    pub(super) message: String,
     /// The errors with their lines of the deck; empty where there is nothing to show
-    pub details: String,
+    pub(super) details: String,
     /// The kind of error
-    pub fault: DeckFault,
+    pub(super) fault: DeckFault,
     /// Failures that the deck itself expects
-    pub expected: Vec<String>,
+    pub(super) expected: Vec<String>,
 }
 
 /// Kinds of errors of a deck.

@@ -179,56 +179,56 @@ pub fn sweep(table: &Path, points: usize, finished: usize, failed: &BTreeMap<&st
 #[derive(Serialize)]
 pub struct SectionStress {
     /// Name of the load
-    pub load: String,
+    pub(super) load: String,
     /// Name of its column
-    pub measure: String,
+    pub(super) measure: String,
     /// Largest, or smallest, value
-    pub value: f64,
+    pub(super) value: f64,
     /// Its place, in the coordinates of the shape
-    pub at: [f64; 2],
+    pub(super) at: [f64; 2],
     /// Its region
-    pub region: String,
+    pub(super) region: String,
 }
 
 /// The numbers of a section.
 #[derive(Serialize)]
 pub struct Section {
     /// Path of the deck
-    pub deck: String,
+    pub(super) deck: String,
     /// Name of the section
-    pub section: String,
+    pub(super) section: String,
     /// Nodes of the mesh of a computed section
-    pub nodes: Option<usize>,
+    pub(super) nodes: Option<usize>,
     /// Estimated relative error of a computed stiffness
-    pub estimate: Option<f64>,
+    pub(super) estimate: Option<f64>,
     /// Area of a computed section
-    pub area: Option<f64>,
+    pub(super) area: Option<f64>,
     /// The point of the shape through which the line of the beam goes
-    pub line: Option<[f64; 2]>,
+    pub(super) line: Option<[f64; 2]>,
     /// Tension centre from the line of the beam
-    pub tension_centre: Option<[f64; 2]>,
+    pub(super) tension_centre: Option<[f64; 2]>,
     /// Shear centre from the line of the beam
-    pub shear_centre: Option<[f64; 2]>,
+    pub(super) shear_centre: Option<[f64; 2]>,
     /// Mass centre from the line of the beam
-    pub mass_centre: Option<[f64; 2]>,
+    pub(super) mass_centre: Option<[f64; 2]>,
     /// 1/S11 about the tension centre
-    pub ea: Option<f64>,
+    pub(super) ea: Option<f64>,
     /// 1/S22 and 1/S33 about the shear centre
-    pub ga: Option<[f64; 2]>,
+    pub(super) ga: Option<[f64; 2]>,
     /// 1/S44
-    pub gj: Option<f64>,
+    pub(super) gj: Option<f64>,
     /// Larger and smaller bending stiffness
-    pub ei: Option<[f64; 2]>,
+    pub(super) ei: Option<[f64; 2]>,
     /// Angle from axis 2 to the axis of the larger bending stiffness, rad
-    pub principal_angle: Option<f64>,
+    pub(super) principal_angle: Option<f64>,
     /// Largest von Mises stresses under unit resultants, or the given ones, of sections with a shape
-    pub stress: Vec<SectionStress>,
+    pub(super) stress: Vec<SectionStress>,
     /// 6x6 stiffness by rows
-    pub stiffness: Vec<Vec<f64>>,
+    pub(super) stiffness: Vec<Vec<f64>>,
     /// 6x6 mass by rows
-    pub mass: Option<Vec<Vec<f64>>>,
+    pub(super) mass: Option<Vec<Vec<f64>>>,
     /// Paths of the pictures
-    pub pictures: Vec<String>,
+    pub(super) pictures: Vec<String>,
 }
 
 /// Prints the numbers of a section.

@@ -27,13 +27,13 @@ const MOST_MESSAGES: usize = 50;
 /// A deck that was read.
 pub struct Loaded {
     /// Its text, with the settings of the command line and the rows of imported tables
-    pub text: String,
+    pub(super) text: String,
     /// What run.json keeps of the text
-    pub source: DeckSource,
+    pub(super) source: DeckSource,
     /// The deck as it stands in the text
-    pub deck: Deck,
+    pub(super) deck: Deck,
     /// The scene
-    pub scene: Scene,
+    pub(super) scene: Scene,
 }
 
 /// Reads a deck and builds its scene; warnings are shown, errors returned, all at once.
@@ -79,9 +79,9 @@ pub struct ReadDeck {
     /// Its name in messages
     label: String,
     /// The deck as it stands in the text
-    pub deck: Deck,
+    pub(super) deck: Deck,
     /// Messages about it
-    pub found: Vec<Diagnostic>,
+    pub(super) found: Vec<Diagnostic>,
 }
 
 impl ReadDeck {

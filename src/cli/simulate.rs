@@ -21,33 +21,33 @@ use std::time::{Duration, Instant};
 #[derive(Default)]
 pub struct RunExtras {
     /// The wanted accuracy and how far it was reached
-    pub accuracy: Option<ReachedAccuracy>,
+    pub(super) accuracy: Option<ReachedAccuracy>,
     /// The outputs of the run where a search has run it already
-    pub outcome: Option<study::Outcome>,
+    pub(super) outcome: Option<study::Outcome>,
     /// Error bars
-    pub bars: Option<ErrorBars>,
+    pub(super) bars: Option<ErrorBars>,
     /// The deck
-    pub source: DeckSource,
+    pub(super) source: DeckSource,
     /// Recorder of shapes for the report
-    pub film: Option<Film>,
+    pub(super) film: Option<Film>,
 }
 
 /// A run that has ended.
 pub struct Finished {
     /// Success, or why it failed
-    pub result: Result<(), Failure>,
+    pub(super) result: Result<(), Failure>,
     /// The work it took
-    pub counters: Counters,
+    pub(super) counters: Counters,
     /// Wall-clock seconds
-    pub seconds: f64,
+    pub(super) seconds: f64,
     /// The recorded shapes
-    pub film: Option<Film>,
+    pub(super) film: Option<Film>,
     /// The content of run.json, where results were written
-    pub record: Option<Record>,
+    pub(super) record: Option<Record>,
     /// The number of threads
-    pub threads: usize,
+    pub(super) threads: usize,
     /// The folder of results, which no other run writes to as long as this value lives
-    pub folder: Option<ResultFolder>,
+    pub(super) folder: Option<ResultFolder>,
 }
 
 /// Bytes that are taken for run.json when a run begins. Longer ones, of decks with long tables, may
@@ -57,11 +57,11 @@ const RESERVED: usize = 64 << 10;
 /// Where the results of a run go, and where it begins.
 pub struct Target {
     /// The folder of results
-    pub folder: ResultFolder,
+    pub(super) folder: ResultFolder,
     /// Where the run goes on, if it is resumed
-    pub saved: Option<Box<SavedRun<Checkpoint>>>,
+    pub(super) saved: Option<Box<SavedRun<Checkpoint>>>,
     /// The time between checkpoints, if any are written
-    pub interval: Option<Duration>,
+    pub(super) interval: Option<Duration>,
 }
 
 impl Target {

@@ -28,17 +28,17 @@ pub struct Helix {
     /// The place at which it starts; its distance from the axis is the radius
     pub start: Spanned<PointRef>,
     /// The name of the point at its end, where it has one
-    pub end: Option<Spanned<PointRef>>,
+    pub(crate) end: Option<Spanned<PointRef>>,
     /// A point on the axis
     pub centre: Spanned<PointRef>,
     /// Direction of the axis, of length one
     pub axis: [f64; 3],
     /// Advance along the axis in a turn
-    pub pitch: f64,
+    pub(crate) pitch: f64,
     /// Turns about the axis; negative: the other way round
-    pub turns: f64,
+    pub(crate) turns: f64,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// `spline = […]` with its `tangents`
@@ -74,43 +74,43 @@ words! {
 #[derive(Clone, Debug)]
 pub struct FreeStrain {
     /// Gamma1 Gamma2 Gamma3 K1 K2 K3 in section axes
-    pub strain: [f64; 6],
+    pub(crate) strain: [f64; 6],
     /// Factor over time; left out: it ramps like a load
-    pub history: Option<HistoryUse>,
+    pub(crate) history: Option<HistoryUse>,
 }
 
 /// `[[beam]]`
 #[derive(Clone, Debug)]
 pub struct Beam {
     /// Name of the beam
-    pub name: Spanned<String>,
+    pub(crate) name: Spanned<String>,
     /// One section, two for a taper, or more
     pub sections: Vec<Spanned<String>>,
     /// Places of the sections, from 0 to 1 as fractions of the length, or to the length; none: at
     /// start and end
-    pub stations: Option<Spanned<Vec<f64>>>,
+    pub(crate) stations: Option<Spanned<Vec<f64>>>,
     /// The unit of the stations; left out: the last of them tells
-    pub stations_in: Option<StationsWord>,
+    pub(crate) stations_in: Option<StationsWord>,
     /// Its centre line
     pub path: Path,
     /// Elements of each piece; one entry for all
     pub elements: Spanned<Vec<Division>>,
     /// Polynomial order of an element
-    pub order: usize,
+    pub(crate) order: usize,
     /// Parts of each piece that node numbers count; left out: those between nodes
-    pub numbering: Option<Spanned<Vec<Division>>>,
+    pub(crate) numbering: Option<Spanned<Vec<Division>>>,
     /// The vector whose normal part is local axis 3
     pub axis3: Option<Spanned<[f64; 3]>>,
     /// Angle of axes 2 and 3 about axis 1: at start and end, or at the stations
-    pub twist: Option<Spanned<Vec<[f64; 1]>>>,
+    pub(crate) twist: Option<Spanned<Vec<[f64; 1]>>>,
     /// Places of the origin of the sections seen from the line, along axes 2 and 3: one, at start
     /// and end, or at the stations
-    pub offset: Option<Spanned<Vec<[f64; 2]>>>,
+    pub(crate) offset: Option<Spanned<Vec<[f64; 2]>>>,
     /// Angle of the sections about axis 1, relative to the axes of the beam: one, at start and end,
     /// or at the stations
-    pub turn: Option<Spanned<Vec<[f64; 1]>>>,
+    pub(crate) turn: Option<Spanned<Vec<[f64; 1]>>>,
     /// Interpolation of rotations
-    pub interpolation: InterpolationWord,
+    pub(crate) interpolation: InterpolationWord,
     /// Strain without stress
     pub free_strain: Option<FreeStrain>,
     /// Place of the table

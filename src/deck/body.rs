@@ -9,15 +9,15 @@ use toml::de::DeValue;
 #[derive(Clone, Debug)]
 pub struct Body {
     /// The point
-    pub at: Spanned<String>,
+    pub(crate) at: Spanned<String>,
     /// Mass
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// Inertia about its own centre, global axes at the start
     pub inertia: Option<[[f64; 3]; 3]>,
     /// Its centre as seen from the node
     pub offset: [f64; 3],
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// Keys of `[[body]]`.

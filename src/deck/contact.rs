@@ -11,35 +11,35 @@ use toml::de::DeValue;
 #[derive(Clone, Debug)]
 pub struct Contact {
     /// Its name
-    pub name: Spanned<String>,
+    pub(crate) name: Spanned<String>,
     /// The beams
-    pub beams: Vec<Spanned<String>>,
+    pub(crate) beams: Vec<Spanned<String>>,
     /// Nodes with a sphere
-    pub nodes: Vec<Spanned<String>>,
+    pub(crate) nodes: Vec<Spanned<String>>,
     /// The surfaces
-    pub surfaces: Vec<Spanned<String>>,
+    pub(crate) surfaces: Vec<Spanned<String>>,
     /// Beams that the beams may touch
-    pub with: Vec<Spanned<String>>,
+    pub(crate) with: Vec<Spanned<String>>,
     /// True if each beam may touch itself
-    pub touches_itself: bool,
+    pub(crate) touches_itself: bool,
     /// The radius
-    pub radius: ContactRadius,
+    pub(crate) radius: ContactRadius,
     /// Coefficients of friction at the start and at the end of beams
-    pub friction: [f64; 2],
+    pub(crate) friction: [f64; 2],
     /// The largest penetration; left out: a thousandth of the radius
-    pub penetration: Option<f64>,
+    pub(crate) penetration: Option<f64>,
     /// Force per penetration of a point; left out: by the stiffness of beams
-    pub stiffness: Option<f64>,
+    pub(crate) stiffness: Option<f64>,
     /// Tangential over normal stiffness
-    pub stick: f64,
+    pub(crate) stick: f64,
     /// Damping in dynamic stages
-    pub damping: ContactDamping,
+    pub(crate) damping: ContactDamping,
     /// Ends of beams
-    pub ends: EndsWord,
+    pub(crate) ends: EndsWord,
     /// Stages from 1; left out: all
-    pub stages: Option<Vec<usize>>,
+    pub(crate) stages: Option<Vec<usize>>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// Radii of beams and bodies in contact.

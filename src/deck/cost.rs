@@ -13,21 +13,21 @@ use toml::de::DeValue;
 #[derive(Clone, Debug, Default)]
 pub struct Cost {
     /// Columns whose error counts; default: all that are written
-    pub outputs: Option<Vec<Spanned<String>>>,
+    pub(crate) outputs: Option<Vec<Spanned<String>>>,
     /// Measure of the error of a column
-    pub norm: Option<NormWord>,
+    pub(crate) norm: Option<NormWord>,
     /// Factors of the numbers of elements of the deck, for its own order
-    pub elements: Option<Vec<f64>>,
+    pub(crate) elements: Option<Vec<f64>>,
     /// Polynomial orders of all elements
-    pub order: Option<Vec<usize>>,
+    pub(crate) order: Option<Vec<usize>>,
     /// Interpolations of all beams
-    pub interpolation: Option<Vec<InterpolationWord>>,
+    pub(crate) interpolation: Option<Vec<InterpolationWord>>,
     /// Schemes of all dynamic stages
-    pub scheme: Option<Vec<SchemeName>>,
+    pub(crate) scheme: Option<Vec<SchemeName>>,
     /// Factors of the steps of the deck
-    pub step: Option<Vec<f64>>,
+    pub(crate) step: Option<Vec<f64>>,
     /// Tolerances of steps that adapt
-    pub step_tolerance: Option<Vec<f64>>,
+    pub(crate) step_tolerance: Option<Vec<f64>>,
 }
 
 words! {

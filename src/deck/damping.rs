@@ -7,9 +7,9 @@ use toml::de::DeValue;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damping {
     /// Factor of the mass, one over a time
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// Factors of the stiffness for Gamma1 Gamma2 Gamma3 K1 K2 K3, times
-    pub stiffness: [f64; 6],
+    pub(crate) stiffness: [f64; 6],
 }
 
 impl Damping {

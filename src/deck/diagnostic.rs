@@ -32,17 +32,17 @@ pub struct Diagnostic {
     /// Its place; none: the deck as a whole
     pub span: Option<Span>,
     /// Text at the caret
-    pub label: String,
+    pub(super) label: String,
     /// Another place that it refers to, with a label
-    pub context: Option<(Span, String)>,
+    pub(super) context: Option<(Span, String)>,
     /// Advice
     pub help: Option<String>,
     /// Severity
-    pub severity: Severity,
+    pub(crate) severity: Severity,
     /// The unknown name, for errors about one
-    pub unknown: Option<String>,
+    pub(crate) unknown: Option<String>,
     /// True for an error about a key that the table does not have
-    pub is_of_key: bool,
+    pub(crate) is_of_key: bool,
 }
 
 /// Severity of a diagnostic.

@@ -12,9 +12,9 @@ use toml::de::DeValue;
 #[derive(Clone, Debug)]
 pub struct Expect {
     /// Expected number, failure or warning
-    pub body: ExpectBody,
+    pub(crate) body: ExpectBody,
     /// Origin of the number
-    pub source: Option<String>,
+    pub(crate) source: Option<String>,
     /// Place of the table
     pub span: Span,
 }
@@ -47,11 +47,11 @@ pub enum ExpectBody {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     /// Expected number
-    pub value: f64,
+    pub(crate) value: f64,
     /// Absolute tolerance
-    pub atol: f64,
+    pub(crate) atol: f64,
     /// Tolerance relative to the value
-    pub rtol: f64,
+    pub(crate) rtol: f64,
 }
 
 /// The rows that an expectation reads.

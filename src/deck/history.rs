@@ -11,10 +11,10 @@ use toml::de::DeValue;
 #[derive(Clone, Debug)]
 pub struct HistoryUse {
     /// The name of the history
-    pub name: Spanned<String>,
+    pub(crate) name: Spanned<String>,
     /// The stages that it belongs to, from 1: in others it stands still. Left out: it is read in
     /// all.
-    pub stages: Option<Vec<usize>>,
+    pub(crate) stages: Option<Vec<usize>>,
 }
 
 impl HistoryUse {
@@ -28,9 +28,9 @@ impl HistoryUse {
 #[derive(Clone, Debug)]
 pub struct HistoryTable {
     /// Name of the table
-    pub name: Spanned<String>,
+    pub(crate) name: Spanned<String>,
     /// Table or expression
-    pub body: HistoryBody,
+    pub(crate) body: HistoryBody,
 }
 
 /// A table or an expression of t.

@@ -21,18 +21,18 @@ pub struct Imported {
     /// triangles follow at the end.
     pub text: String,
     /// The tables, in the order in which they are read
-    pub tables: Vec<ImportedTable>,
+    pub(crate) tables: Vec<ImportedTable>,
 }
 
 /// A table or a mesh that a deck imports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedTable {
     /// Its path in the deck
-    pub name: String,
+    pub(crate) name: String,
     /// The number of its rows or triangles
-    pub rows: usize,
+    pub(crate) rows: usize,
     /// A fingerprint of the content of its file
-    pub hash: String,
+    pub(crate) hash: String,
 }
 
 /// Replaces everything that a deck imports by the rows of the files.

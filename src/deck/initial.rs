@@ -19,7 +19,7 @@ pub enum InitialTarget {
 #[derive(Clone, Debug)]
 pub struct Initial {
     /// Node, beam or everything
-    pub target: InitialTarget,
+    pub(crate) target: InitialTarget,
     /// Velocity
     pub velocity: [f64; 3],
     /// Angular velocity
@@ -27,7 +27,7 @@ pub struct Initial {
     /// A point on the axis of the spin: a name or coordinates
     pub about: Option<Spanned<PointRef>>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// Keys of `[[initial]]`.

@@ -13,28 +13,28 @@ use toml::de::DeValue;
 #[derive(Clone, Debug)]
 pub struct Joint {
     /// Kind, by the motions that it leaves free
-    pub kind: JointKind,
+    pub(crate) kind: JointKind,
     /// Connected beams or nodes
     pub parts: JointParts,
     /// Its axis, or both axes of a universal joint; global, at the start
     pub axes: Vec<[f64; 3]>,
     /// About or along the axis
-    pub stiffness: f64,
+    pub(crate) stiffness: f64,
     /// About or along the axis
-    pub damping: f64,
+    pub(crate) damping: f64,
     /// Motor on the free direction
-    pub motor: Option<JointMotor>,
+    pub(crate) motor: Option<JointMotor>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// A prescribed angle or displacement of a joint.
 #[derive(Clone, Debug)]
 pub struct JointMotor {
     /// Radians of a revolute joint, length of a prismatic one
-    pub value: f64,
+    pub(crate) value: f64,
     /// Factor over time or load factor
-    pub history: Option<HistoryUse>,
+    pub(crate) history: Option<HistoryUse>,
 }
 
 /// The parts that a joint connects; one part is joined to ground.

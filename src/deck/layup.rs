@@ -9,9 +9,9 @@ use toml::de::DeValue;
 #[derive(Clone, Debug)]
 pub struct Layup {
     /// Name of the table
-    pub name: Spanned<String>,
+    pub(crate) name: Spanned<String>,
     /// Plies, from the left face of a wall (looking along it) or the outside of a skin
-    pub plies: Vec<Ply>,
+    pub(crate) plies: Vec<Ply>,
 }
 
 /// A ply of a layup.

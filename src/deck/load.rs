@@ -41,7 +41,7 @@ pub enum LoadTarget {
 #[derive(Clone, Debug)]
 pub struct Load {
     /// Node or beam
-    pub target: LoadTarget,
+    pub(crate) target: LoadTarget,
     /// Force
     pub force: Option<LoadVector>,
     /// Moment
@@ -49,11 +49,11 @@ pub struct Load {
     /// Frame of its components
     pub frame: Frame,
     /// Factor over time or load factor
-    pub history: Option<HistoryUse>,
+    pub(crate) history: Option<HistoryUse>,
     /// Stages from 1; left out: all
-    pub stages: Option<Vec<usize>>,
+    pub(crate) stages: Option<Vec<usize>>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// Keys of `[[load]]`.

@@ -10,13 +10,13 @@ pub struct Material {
     /// Name of the table
     pub name: Spanned<String>,
     /// Elastic constants
-    pub elastic: Elastic,
+    pub(crate) elastic: Elastic,
     /// Density, where given
     pub density: Option<f64>,
     /// Strength, where given
-    pub strength: Option<Strength>,
+    pub(crate) strength: Option<Strength>,
     /// Largest strain along the fibre, where given
-    pub strain_limit: Option<f64>,
+    pub(crate) strain_limit: Option<f64>,
 }
 
 /// Strength of a material.
@@ -55,11 +55,11 @@ pub enum Elastic {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Isotropic {
     /// Young's modulus
-    pub young: f64,
+    pub(crate) young: f64,
     /// Shear modulus
-    pub shear: f64,
+    pub(crate) shear: f64,
     /// Poisson's ratio, for the shear factor
-    pub poisson: f64,
+    pub(crate) poisson: f64,
 }
 
 /// Keys of `[material.NAME]`.

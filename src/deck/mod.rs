@@ -106,15 +106,15 @@ use toml::de::{DeTable, DeValue};
 #[derive(Clone, Debug, Default)]
 pub struct Deck {
     /// Title
-    pub title: Option<String>,
+    pub(crate) title: Option<String>,
     /// Acceleration of gravity
     pub gravity: Option<Spanned<[f64; 3]>>,
     /// Named places
     pub points: Vec<(Spanned<String>, [f64; 3])>,
     /// Materials
-    pub materials: Vec<Material>,
+    pub(crate) materials: Vec<Material>,
     /// Plies of walls
-    pub layups: Vec<Layup>,
+    pub(crate) layups: Vec<Layup>,
     /// Sections
     pub sections: Vec<Section>,
     /// Beams
@@ -126,7 +126,7 @@ pub struct Deck {
     /// Joints
     pub joints: Vec<Joint>,
     /// Sliding joints along beams
-    pub sliders: Vec<Slider>,
+    pub(crate) sliders: Vec<Slider>,
     /// Rigid bodies
     pub bodies: Vec<Body>,
     /// Springs and cables
@@ -134,37 +134,37 @@ pub struct Deck {
     /// Triangles of mesh files
     pub meshes: Vec<MeshTable>,
     /// Rigid surfaces
-    pub surfaces: Vec<Surface>,
+    pub(crate) surfaces: Vec<Surface>,
     /// Contacts of beams and bodies with surfaces
-    pub contacts: Vec<Contact>,
+    pub(crate) contacts: Vec<Contact>,
     /// Loads
     pub loads: Vec<Load>,
     /// Rayleigh factors of mass and stiffness
-    pub damping: Option<Damping>,
+    pub(crate) damping: Option<Damping>,
     /// Initial velocities
     pub initials: Vec<Initial>,
     /// Histories
-    pub histories: Vec<HistoryTable>,
+    pub(crate) histories: Vec<HistoryTable>,
     /// Stages
     pub stages: Vec<Stage>,
     /// Effects forced on or off
-    pub effects: Effects,
+    pub(crate) effects: Effects,
     /// Written nodes, columns and rows
-    pub output: Output,
+    pub(crate) output: Output,
     /// Variants of a study of accuracy and time
-    pub cost: Cost,
+    pub(crate) cost: Cost,
     /// Largest estimated errors of outputs
-    pub accuracy: Option<Accuracy>,
+    pub(crate) accuracy: Option<Accuracy>,
     /// Expectations
     pub expects: Vec<Expect>,
     /// The values of `[param]`
-    pub parameters: Parameters,
+    pub(crate) parameters: Parameters,
     /// Number of stages in the text
-    pub stage_count: usize,
+    pub(crate) stage_count: usize,
     /// Names of tables that could not be read: they are not unknown
-    pub broken: Vec<String>,
+    pub(crate) broken: Vec<String>,
     /// The deck with expressions replaced by numbers, for run.json
-    pub resolved: serde_json::Value,
+    pub(crate) resolved: serde_json::Value,
 }
 
 /// Keys of a deck.

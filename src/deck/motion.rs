@@ -10,17 +10,17 @@ use super::stage::read_stages;
 #[derive(Clone, Debug)]
 pub struct Motion {
     /// The node
-    pub at: Spanned<String>,
+    pub(crate) at: Spanned<String>,
     /// Prescribed quantity
     pub what: MotionWhat,
     /// Directions of displacements; left out: the global axes
     pub axes: Option<Axes>,
     /// Factor over time or load factor
-    pub history: Option<HistoryUse>,
+    pub(crate) history: Option<HistoryUse>,
     /// Stages from 1; left out: all
-    pub stages: Option<Vec<usize>>,
+    pub(crate) stages: Option<Vec<usize>>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// The quantity that a motion prescribes.

@@ -7,9 +7,9 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Looked {
     /// The column
-    pub column: String,
+    pub(crate) column: String,
     /// Instant, or rows
-    pub reduce: Reduce,
+    reduce: Reduce,
 }
 
 impl Looked {

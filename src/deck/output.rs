@@ -8,21 +8,21 @@ use super::stage::MOST_STEPS;
 #[derive(Clone, Debug)]
 pub struct Output {
     /// The nodes that are written; default: every named point that is a node
-    pub nodes: Option<Vec<Spanned<String>>>,
+    pub(crate) nodes: Option<Vec<Spanned<String>>>,
     /// The groups of columns; default: u and r
-    pub columns: Option<Vec<Spanned<String>>>,
+    pub(crate) columns: Option<Vec<Spanned<String>>>,
     /// Each n-th row
-    pub every: usize,
+    pub(crate) every: usize,
     /// Rows at multiples of this time
-    pub interval: Option<f64>,
+    pub(crate) interval: Option<f64>,
     /// Place of `interval`
-    pub interval_span: Span,
+    pub(crate) interval_span: Span,
     /// True where the whole shape is written for ParaView
-    pub vtk: bool,
+    pub(crate) vtk: bool,
     /// Place of `envelope`, where the largest stresses along all beams are written
-    pub envelope: Option<Span>,
+    pub(crate) envelope: Option<Span>,
     /// Place of `profile`, where resultants along all beams are written
-    pub profile: Option<Span>,
+    pub(crate) profile: Option<Span>,
 }
 
 impl Default for Output {

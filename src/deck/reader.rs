@@ -17,13 +17,13 @@ pub type Item<'a> = toml::Spanned<DeValue<'a>>;
 /// Parameters and stages that readers refer to, and the diagnostics that they collect.
 pub struct Context {
     /// The values of `[param]`
-    pub parameters: Parameters,
+    pub(super) parameters: Parameters,
     /// Number of stages of the deck
-    pub stage_count: usize,
+    pub(super) stage_count: usize,
     /// Errors and warnings so far
-    pub diagnostics: RefCell<Vec<Diagnostic>>,
+    pub(super) diagnostics: RefCell<Vec<Diagnostic>>,
     /// The numbers that strings stood for, by the start of the string
-    pub resolved: RefCell<BTreeMap<usize, f64>>,
+    pub(super) resolved: RefCell<BTreeMap<usize, f64>>,
 }
 
 impl Context {
@@ -185,11 +185,11 @@ pub fn kind_of(value: &DeValue) -> &'static str {
 /// One table of the deck.
 pub struct Table<'a> {
     /// Parameters and diagnostics
-    pub context: &'a Context,
+    pub(super) context: &'a Context,
     /// Its name in messages: `[[beam]]`
-    pub what: String,
+    pub(super) what: String,
     /// Place of the table
-    pub span: Span,
+    pub(super) span: Span,
     entries: &'a DeTable<'a>,
     /// Known keys that misspelt ones stand for: they are not reported as missing again.
     misspelt: Vec<String>,

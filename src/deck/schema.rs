@@ -13,25 +13,25 @@ pub struct Entry {
     /// Path of the key: `beam.elements`
     pub path: String,
     /// The word, in the entry of a word
-    pub word: Option<String>,
+    pub(crate) word: Option<String>,
     /// Its table: `[[beam]]`, `the deck`
-    pub table: String,
+    pub(crate) table: String,
     /// Meaning
-    pub description: String,
+    pub(crate) description: String,
     /// Kinds of values, or words
     pub kinds: String,
     /// Words that are values of the key
-    pub words: Vec<String>,
+    words: Vec<String>,
     /// Unit, if it has one
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// Default, as TOML
-    pub default: Option<String>,
+    pub(crate) default: Option<String>,
     /// Examples, as TOML
     pub examples: Vec<String>,
     /// Keys of a table
-    pub keys: Vec<String>,
+    pub(crate) keys: Vec<String>,
     /// True if its table needs it
-    pub required: bool,
+    pub(crate) required: bool,
 }
 
 /// Entries of a key (`elements`, in all tables that have it, or `beam.elements`), of a table

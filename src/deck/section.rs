@@ -14,18 +14,18 @@ pub struct Section {
     /// Stiffness and mass in one of three ways
     pub body: SectionBody,
     /// Points of the shape at which stresses are written
-    pub probes: Vec<SectionProbe>,
+    pub(crate) probes: Vec<SectionProbe>,
     /// Search for the largest stress near re-entrant corners
-    pub corner: CornerWord,
+    pub(crate) corner: CornerWord,
 }
 
 /// A named point of a shape.
 #[derive(Clone, Debug)]
 pub struct SectionProbe {
     /// Name
-    pub name: Spanned<String>,
+    pub(crate) name: Spanned<String>,
     /// Coordinates 2 and 3 of the shape
-    pub at: [f64; 2],
+    pub(crate) at: [f64; 2],
 }
 
 words! {

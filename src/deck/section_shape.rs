@@ -143,30 +143,30 @@ pub enum Shape {
 #[derive(Clone, Debug)]
 pub struct ComputedSection {
     /// Shape
-    pub shape: ComputedShape,
+    pub(crate) shape: ComputedShape,
     /// Place of the shape
-    pub span: Span,
+    pub(crate) span: Span,
     /// Name of the material of the whole, or of what names none itself
-    pub material: Option<Spanned<String>>,
+    pub(crate) material: Option<Spanned<String>>,
     /// Orientation of the material of the whole
-    pub fibre: Fibre,
+    pub(crate) fibre: Fibre,
     /// The point of the shape through which the line of the beam goes
-    pub reference: Option<Reference>,
+    pub(crate) reference: Option<Reference>,
     /// Turn of the shape about the line of the beam, from axis 2 towards axis 3, rad
-    pub turn: f64,
+    pub(crate) turn: f64,
     /// Aim of the mesh, where given
-    pub mesh: Option<MeshAim>,
+    pub(crate) mesh: Option<MeshAim>,
     /// Shear factors along 2 and 3 of closed forms
-    pub shear_factor: Option<ShearFactor>,
+    pub(crate) shear_factor: Option<ShearFactor>,
 }
 
 /// `theta` and `beta`
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fibre {
     /// Angle of the fibre from axis 1 towards the tangent, rad
-    pub theta: f64,
+    pub(crate) theta: f64,
     /// Angle of the tangent from axis 2 towards axis 3, rad
-    pub beta: f64,
+    pub(crate) beta: f64,
 }
 
 /// `reference = …`
@@ -191,15 +191,15 @@ pub enum MeshAim {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flanged {
     /// Depth
-    pub d: f64,
+    pub(crate) d: f64,
     /// Width
-    pub b: f64,
+    pub(crate) b: f64,
     /// Thickness of the flanges
-    pub t_f: f64,
+    pub(crate) t_f: f64,
     /// Thickness of the web
-    pub t_w: f64,
+    pub(crate) t_w: f64,
     /// Root radius
-    pub r: f64,
+    pub(crate) r: f64,
 }
 
 /// A shape of `[section.NAME]`.
@@ -320,39 +320,39 @@ pub struct Region {
     /// Name of the material, if not that of the section
     pub material: Option<Spanned<String>>,
     /// Outer boundary
-    pub outline: Outline,
+    pub(crate) outline: Outline,
     /// Holes
-    pub holes: Vec<Outline>,
+    pub(crate) holes: Vec<Outline>,
     /// Orientation of the material
-    pub fibre: Fibre,
+    pub(crate) fibre: Fibre,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// Walls between points.
 #[derive(Clone, Debug)]
 pub struct Walls {
     /// Names and places of points
-    pub points: Vec<(Spanned<String>, [f64; 2])>,
+    pub(crate) points: Vec<(Spanned<String>, [f64; 2])>,
     /// Walls
-    pub walls: Vec<Wall>,
+    pub(crate) walls: Vec<Wall>,
     /// Sense of angles of fibres
-    pub theta_sense: ThetaSenseWord,
+    pub(crate) theta_sense: ThetaSenseWord,
 }
 
 /// A wall.
 #[derive(Clone, Debug)]
 pub struct Wall {
     /// Names of its points
-    pub ends: [Spanned<String>; 2],
+    pub(crate) ends: [Spanned<String>; 2],
     /// Its plies
-    pub plies: WallPlies,
+    pub(crate) plies: WallPlies,
     /// Side of the line on which it lies
-    pub side: WallSideWord,
+    pub(crate) side: WallSideWord,
     /// A point between the ends, of a round wall
-    pub arc: Option<[f64; 2]>,
+    pub(crate) arc: Option<[f64; 2]>,
     /// Its place in the text
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// The build of a wall.
@@ -368,43 +368,43 @@ pub enum WallPlies {
 #[derive(Clone, Debug)]
 pub struct Airfoil {
     /// Points in parts of the chord, from the trailing edge over the upper side back
-    pub profile: Spanned<Vec<[f64; 2]>>,
+    pub(crate) profile: Spanned<Vec<[f64; 2]>>,
     /// Length of the chord
-    pub chord: f64,
+    pub(crate) chord: f64,
     /// Part of the chord, from the leading edge, at which the origin lies
-    pub pitch_axis: f64,
+    pub(crate) pitch_axis: f64,
     /// Direction of the leading edge
-    pub leading_edge: LeadingEdgeWord,
+    pub(crate) leading_edge: LeadingEdgeWord,
     /// Parts of the skin
-    pub skin: Vec<SkinPart>,
+    pub(crate) skin: Vec<SkinPart>,
     /// Webs
-    pub webs: Vec<Web>,
+    pub(crate) webs: Vec<Web>,
     /// Trailing edge
-    pub trailing_edge: TrailingEdgeWord,
+    pub(crate) trailing_edge: TrailingEdgeWord,
     /// Sense of angles of fibres
-    pub theta_sense: ThetaSenseWord,
+    pub(crate) theta_sense: ThetaSenseWord,
 }
 
 /// A part of the skin between two parts of the chord.
 #[derive(Clone, Debug)]
 pub struct SkinPart {
     /// Its ends, as parts of the chord from the leading edge
-    pub ends: [f64; 2],
+    pub(crate) ends: [f64; 2],
     /// Name of its layup
-    pub layup: Spanned<String>,
+    pub(crate) layup: Spanned<String>,
     /// Side of the profile
-    pub side: SkinSideWord,
+    pub(crate) side: SkinSideWord,
 }
 
 /// A web between both sides of the skin.
 #[derive(Clone, Debug)]
 pub struct Web {
     /// Part of the chord
-    pub at: f64,
+    pub(crate) at: f64,
     /// Name of its layup
-    pub layup: Spanned<String>,
+    pub(crate) layup: Spanned<String>,
     /// Its place in the text
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// Relative round-off of a full turn that was computed

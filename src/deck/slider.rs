@@ -8,13 +8,13 @@ use super::reader::{Context, Item, Table};
 #[derive(Clone, Debug)]
 pub struct Slider {
     /// What slides
-    pub slides: Sliding,
+    pub(crate) slides: Sliding,
     /// The beam on which it slides
-    pub on: Spanned<String>,
+    pub(crate) on: Spanned<String>,
     /// A prescribed sliding; left out: free
-    pub drive: Option<SliderDrive>,
+    pub(crate) drive: Option<SliderDrive>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// The nodes of a `[[slider]]`.
@@ -35,9 +35,9 @@ pub enum Sliding {
 #[derive(Clone, Debug)]
 pub struct SliderDrive {
     /// Initial arc length, from where the node is at the start
-    pub displacement: f64,
+    pub(crate) displacement: f64,
     /// Factor over time or load factor
-    pub history: Option<HistoryUse>,
+    pub(crate) history: Option<HistoryUse>,
 }
 
 /// Keys of `[[slider]]`.

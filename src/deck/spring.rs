@@ -11,9 +11,9 @@ pub struct Spring {
     /// Ends and stiffness
     pub body: SpringBody,
     /// Stages from 1; left out: all
-    pub stages: Option<Vec<usize>>,
+    pub(crate) stages: Option<Vec<usize>>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// Kinds of springs.

@@ -13,7 +13,7 @@ use toml::de::DeValue;
 #[derive(Clone, Debug)]
 pub struct Stage {
     /// Kind with its own keys
-    pub body: StageBody,
+    pub(crate) body: StageBody,
     /// Newton's tolerance
     pub tolerance: f64,
     /// Newton's limit
@@ -23,7 +23,7 @@ pub struct Stage {
     /// A rotating frame from which it is seen
     pub frame: Option<RotatingFrame>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// `frame = { spin = …, about = … }`

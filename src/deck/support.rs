@@ -12,15 +12,15 @@ use toml::de::DeValue;
 #[derive(Clone, Debug)]
 pub struct Support {
     /// The node
-    pub at: Spanned<String>,
+    pub(crate) at: Spanned<String>,
     /// Held ones of ux uy uz rx ry rz
-    pub fix: [bool; 6],
+    pub(crate) fix: [bool; 6],
     /// Directions of these; left out: the global axes
     pub axes: Option<Axes>,
     /// Stages from 1; left out: all
     pub stages: Option<Vec<usize>>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 words! {

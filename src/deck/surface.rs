@@ -13,21 +13,21 @@ use toml::de::DeValue;
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// Its name
-    pub name: Spanned<String>,
+    pub(crate) name: Spanned<String>,
     /// Its shape
-    pub body: SurfaceBody,
+    pub(crate) body: SurfaceBody,
     /// The side on which beams are
     pub side: SideWord,
     /// The node that carries it; left out: the ground
-    pub on: Option<Spanned<String>>,
+    pub(crate) on: Option<Spanned<String>>,
     /// A motion of its own
-    pub motion: Option<SurfaceMotion>,
+    pub(crate) motion: Option<SurfaceMotion>,
     /// Factor of its motion over time or load factor
-    pub history: Option<HistoryUse>,
+    pub(crate) history: Option<HistoryUse>,
     /// Stages of its motion, from 1; left out: all
-    pub stages: Option<Vec<usize>>,
+    pub(crate) stages: Option<Vec<usize>>,
     /// Place of the table
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// A point of a surface by its name or its coordinates.

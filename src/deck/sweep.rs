@@ -10,30 +10,30 @@ use toml::de::{DeTable, DeValue};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SweepFile {
     /// The deck, seen from the folder of the file
-    pub deck: String,
+    pub(crate) deck: String,
     /// Changes to the deck for all points, as in `--set`
-    pub set: Vec<String>,
+    pub(crate) set: Vec<String>,
     /// Varied keys, in order
-    pub vary: Vec<VaryTable>,
+    pub(crate) vary: Vec<VaryTable>,
     /// True where the first values of all keys make the first point, and so on
-    pub zip: bool,
+    pub(crate) zip: bool,
     /// Number of samples
-    pub sample: Option<usize>,
+    pub(crate) sample: Option<usize>,
     /// Random seed
-    pub seed: Option<u64>,
+    pub(crate) seed: Option<u64>,
     /// Observables
-    pub outputs: Vec<String>,
+    pub(crate) outputs: Vec<String>,
     /// True where errors of these are estimated
-    pub error_bars: bool,
+    pub(crate) error_bars: bool,
 }
 
 /// A key that is varied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VaryTable {
     /// As in `--set`
-    pub key: Spanned<String>,
+    pub(crate) key: Spanned<String>,
     /// Its values
-    pub body: VaryBody,
+    pub(crate) body: VaryBody,
 }
 
 /// Values of a key.

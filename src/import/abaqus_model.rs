@@ -6,29 +6,29 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeamElement {
     /// Its nodes from start to end: two or three
-    pub nodes: Vec<u64>,
+    pub(crate) nodes: Vec<u64>,
     /// True if it stays in the plane of x and y
-    pub is_planar: bool,
+    pub(super) is_planar: bool,
     /// Line in the file, from 1
-    pub line: usize,
+    pub(super) line: usize,
 }
 
 /// Directions (0 to 5) in which a node is held.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Held {
     /// From 0 to 5
-    pub directions: BTreeSet<usize>,
+    pub(super) directions: BTreeSet<usize>,
     /// Last line in the file, from 1
-    pub line: usize,
+    pub(super) line: usize,
 }
 
 /// Force and moment at a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodeLoad {
     /// Three components of force, three of moment
-    pub vector: [f64; 6],
+    pub(super) vector: [f64; 6],
     /// Last line in the file, from 1
-    pub line: usize,
+    pub(super) line: usize,
 }
 
 /// The shape of a section, in its axes n1 and n2.
@@ -53,24 +53,24 @@ pub enum Profile {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeamSection {
     /// Name of its set of elements, in capitals
-    pub set: String,
+    pub(super) set: String,
     /// Name of its material, in capitals
-    pub material: String,
+    pub(super) material: String,
     /// Shape
-    pub profile: Profile,
+    pub(super) profile: Profile,
     /// Direction of n1
-    pub n1: [f64; 3],
+    pub(super) n1: [f64; 3],
     /// Line in the file, from 1
-    pub line: usize,
+    pub(super) line: usize,
 }
 
 /// An isotropic material.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Elastic {
     /// Young's modulus and Poisson's ratio
-    pub elastic: Option<[f64; 2]>,
+    pub(super) elastic: Option<[f64; 2]>,
     /// Density
-    pub density: Option<f64>,
+    pub(super) density: Option<f64>,
 }
 
 /// The first analysis of a file.
@@ -91,31 +91,31 @@ pub enum Analysis {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Model {
     /// Name of the file
-    pub file: String,
+    pub(super) file: String,
     /// First line of `*HEADING`
-    pub title: String,
+    pub(super) title: String,
     /// Places of nodes
-    pub nodes: BTreeMap<u64, [f64; 3]>,
+    pub(super) nodes: BTreeMap<u64, [f64; 3]>,
     /// Elements of beams
-    pub elements: BTreeMap<u64, BeamElement>,
+    pub(super) elements: BTreeMap<u64, BeamElement>,
     /// Sets of elements
-    pub element_sets: BTreeMap<String, BTreeSet<u64>>,
+    pub(super) element_sets: BTreeMap<String, BTreeSet<u64>>,
     /// Sets of nodes
-    pub node_sets: BTreeMap<String, BTreeSet<u64>>,
+    pub(super) node_sets: BTreeMap<String, BTreeSet<u64>>,
     /// Materials
-    pub materials: BTreeMap<String, Elastic>,
+    pub(super) materials: BTreeMap<String, Elastic>,
     /// Sections
-    pub sections: Vec<BeamSection>,
+    pub(super) sections: Vec<BeamSection>,
     /// Supports of nodes
-    pub held: BTreeMap<u64, Held>,
+    pub(super) held: BTreeMap<u64, Held>,
     /// Forces and moments at nodes
-    pub loads: BTreeMap<u64, NodeLoad>,
+    pub(super) loads: BTreeMap<u64, NodeLoad>,
     /// Forces per length on elements
-    pub line_loads: BTreeMap<u64, [f64; 3]>,
+    pub(super) line_loads: BTreeMap<u64, [f64; 3]>,
     /// Acceleration of gravity
-    pub gravity: Option<[f64; 3]>,
+    pub(super) gravity: Option<[f64; 3]>,
     /// The first analysis
-    pub analysis: Option<Analysis>,
+    pub(super) analysis: Option<Analysis>,
     /// Messages about parts of the file that are left out
-    pub notes: Vec<String>,
+    pub(super) notes: Vec<String>,
 }

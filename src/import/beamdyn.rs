@@ -18,22 +18,22 @@ pub const ORDER: [usize; 6] = [2, 0, 1, 5, 3, 4];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeyPoint {
     /// Place in the root frame
-    pub place: [f64; 3],
+    pub(super) place: [f64; 3],
     /// Angle about the negative axis, rad
-    pub twist: f64,
+    pub(super) twist: f64,
 }
 
 /// A station with its section, in the order of axes of sections here.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BladeStation {
     /// Fraction of the arc length of the reference axis
-    pub eta: f64,
+    pub(super) eta: f64,
     /// Stiffness
-    pub stiffness: Matrix6<f64>,
+    pub(super) stiffness: Matrix6<f64>,
     /// Mass
-    pub mass: Matrix6<f64>,
+    pub(super) mass: Matrix6<f64>,
     /// Line of its matrices in the file, from 1
-    pub line: usize,
+    pub(super) line: usize,
 }
 
 /// Form of the files of a blade.
@@ -49,44 +49,44 @@ pub enum Origin {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Blade {
     /// Second line of the primary file
-    pub title: String,
+    pub(super) title: String,
     /// Form of the files
     pub origin: Origin,
     /// Name of the primary file
-    pub primary: String,
+    pub(super) primary: String,
     /// Name of the blade file
-    pub file: String,
+    pub(super) file: String,
     /// Key points from root to tip
-    pub key_points: Vec<KeyPoint>,
+    pub(super) key_points: Vec<KeyPoint>,
     /// Numbers of the key points at which members end
-    pub member_ends: Vec<usize>,
+    pub(super) member_ends: Vec<usize>,
     /// Stations from 0 to 1
-    pub stations: Vec<BladeStation>,
+    pub(super) stations: Vec<BladeStation>,
     /// Factors of stiffness-proportional damping for strains 1, 2, 3 and curvatures 1, 2, 3, times
-    pub mu: Option<[f64; 6]>,
+    pub(super) mu: Option<[f64; 6]>,
     /// Spectral radius of the time integration
-    pub rho_inf: f64,
+    pub(super) rho_inf: f64,
     /// Messages about parts of the files that are left out
-    pub notes: Vec<String>,
+    pub(super) notes: Vec<String>,
 }
 
 /// Loads and times of the driver of BeamDyn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Driver {
     /// Name of its file
-    pub file: String,
+    pub(super) file: String,
     /// End and step of a dynamic analysis; `None` for a static one
-    pub dynamic: Option<[f64; 2]>,
+    pub(super) dynamic: Option<[f64; 2]>,
     /// Acceleration
-    pub gravity: [f64; 3],
+    pub(super) gravity: [f64; 3],
     /// Force and moment per length
-    pub along: [f64; 6],
+    pub(super) along: [f64; 6],
     /// Force and moment at the tip
-    pub tip: [f64; 6],
+    pub(super) tip: [f64; 6],
     /// Fractions of the length, with force and moment there
-    pub points: Vec<(f64, [f64; 6])>,
+    pub(super) points: Vec<(f64, [f64; 6])>,
     /// Messages about parts of the files that are left out
-    pub notes: Vec<String>,
+    pub(super) notes: Vec<String>,
 }
 
 /// Reads a primary file, and the blade file that it names: `open` gives the path and the text of

@@ -6,25 +6,25 @@ use super::lines::{ImportError, Lines, Word, shown};
 /// A parameter of a keyword.
 pub struct Parameter<'t> {
     /// In capitals, without spaces
-    pub name: String,
+    pub(super) name: String,
     /// Line in the file, from 0
-    pub line: usize,
+    pub(super) line: usize,
     /// Column of its name, from 1
-    pub column: usize,
+    pub(super) column: usize,
     /// Without quotes; empty if it has none
-    pub value: Word<'t>,
+    pub(super) value: Word<'t>,
 }
 
 /// A keyword with its data.
 pub struct Block<'t> {
     /// In capitals, without spaces: `BEAMSECTION`
-    pub name: String,
+    pub(super) name: String,
     /// Line of the keyword, from 0
-    pub line: usize,
+    pub(super) line: usize,
     /// Its parameters, in order
-    pub parameters: Vec<Parameter<'t>>,
+    pub(super) parameters: Vec<Parameter<'t>>,
     /// Lines of data, from 0, that are not empty
-    pub data: Vec<usize>,
+    pub(super) data: Vec<usize>,
 }
 
 impl<'t> Block<'t> {

@@ -10,11 +10,11 @@ const LONGEST: usize = 40;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImportError {
     /// Name of the file
-    pub file: String,
+    pub(super) file: String,
     /// Line and column from 1; `None` for the whole file
-    pub at: Option<[usize; 2]>,
+    pub(super) at: Option<[usize; 2]>,
     /// The fault, in a sentence
-    pub message: String,
+    pub(super) message: String,
 }
 
 impl fmt::Display for ImportError {
@@ -30,9 +30,9 @@ impl fmt::Display for ImportError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Word<'t> {
     /// Without quotes
-    pub text: &'t str,
+    pub(super) text: &'t str,
     /// Column of its first character, from 1
-    pub column: usize,
+    pub(super) column: usize,
 }
 
 /// The lines of a file.

@@ -39,25 +39,25 @@ struct Origin {
 #[derive(Deserialize, Serialize)]
 pub struct SavedRun<R> {
     /// How often the run has been resumed already
-    pub resumed: u32,
+    pub(crate) resumed: u32,
     /// Converged states so far
-    pub rows: u64,
+    pub(crate) rows: u64,
     /// The rows of the history that are written
-    pub history: SavedHistory,
+    pub(crate) history: SavedHistory,
     /// Modes and critical loads so far
-    pub modes: ModesWriter,
+    pub(crate) modes: ModesWriter,
     /// The fields that are written
-    pub fields: Option<SavedFields>,
+    pub(crate) fields: Option<SavedFields>,
     /// The shapes for the report so far
-    pub reel: Option<Reel>,
+    pub(crate) reel: Option<Reel>,
     /// The error bars so far
-    pub bars: Option<SavedBars>,
+    pub(crate) bars: Option<SavedBars>,
     /// Rows with the largest stresses so far, where they are followed
-    pub envelope: Option<Vec<Followed>>,
+    pub(crate) envelope: Option<Vec<Followed>>,
     /// Resultants at the ends of stages so far, where they are written
-    pub profile: Option<Vec<StageEnd>>,
+    pub(crate) profile: Option<Vec<StageEnd>>,
     /// The run
-    pub run: R,
+    pub(crate) run: R,
 }
 
 /// A checkpoint that was found in a folder of results.

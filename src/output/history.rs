@@ -28,9 +28,9 @@ const FLUSH_INTERVAL: Duration = Duration::from_millis(20);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rows {
     /// Every n-th row
-    pub every: usize,
+    pub(crate) every: usize,
     /// The time interval; it takes precedence in stages that advance time
-    pub interval: Option<f64>,
+    pub(crate) interval: Option<f64>,
 }
 
 impl Rows {
@@ -56,12 +56,12 @@ pub struct RowCounter {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// Its number, from 0
-    pub number: u64,
+    pub(super) number: u64,
     /// True for a row that is always written; any other is written only if it turns out to be the
     /// last
-    pub wanted: bool,
+    pub(super) wanted: bool,
     /// True if its stage advances time
-    pub dynamic: bool,
+    dynamic: bool,
 }
 
 impl RowCounter {
@@ -106,24 +106,24 @@ pub trait SideColumns: Send {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct SavedBars {
     /// The runs that the history is compared with
-    pub companions: Vec<SavedCompanion>,
+    pub(crate) companions: Vec<SavedCompanion>,
     /// The largest estimates so far, for each companion and column
-    pub largest: Vec<Vec<f64>>,
+    pub(crate) largest: Vec<Vec<f64>>,
     /// The largest value so far of each column's kind
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
 }
 
 /// A run that a history is compared with.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct SavedCompanion {
     /// The moment of each row
-    pub moments: Vec<Moment>,
+    pub(crate) moments: Vec<Moment>,
     /// The columns of the history, row by row
-    pub rows: Vec<Vec<f64>>,
+    pub(crate) rows: Vec<Vec<f64>>,
     /// For each column: a difference over this is an error
-    pub divisors: Vec<f64>,
+    pub(crate) divisors: Vec<f64>,
     /// The row that was compared last
-    pub next: usize,
+    pub(crate) next: usize,
 }
 
 /// A history as far as it is written.

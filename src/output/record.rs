@@ -26,21 +26,21 @@ const FINISHED: &str = "finished";
 /// A run that has ended.
 pub struct FinishedRun<'a> {
     /// Success, or why it failed
-    pub result: &'a Result<(), Failure>,
+    pub(crate) result: &'a Result<(), Failure>,
     /// The work it took, and its findings
-    pub counters: &'a Counters,
+    pub(crate) counters: &'a Counters,
     /// Wall-clock seconds of the run
-    pub seconds: f64,
+    pub(crate) seconds: f64,
     /// The number of threads
-    pub threads: usize,
+    pub(crate) threads: usize,
     /// The wanted accuracy and how far it was reached
-    pub accuracy: Option<ReachedAccuracy>,
+    pub(crate) accuracy: Option<ReachedAccuracy>,
     /// The deck
-    pub source: DeckSource,
+    pub(crate) source: DeckSource,
     /// How often the run was resumed
-    pub resumed: u32,
+    pub(crate) resumed: u32,
     /// The largest stresses, where they were followed
-    pub envelope: Option<&'a Envelope>,
+    pub(crate) envelope: Option<&'a Envelope>,
 }
 
 /// The text of a deck, and the long tables beside it. Their rows are not repeated in run.json: a
@@ -48,66 +48,66 @@ pub struct FinishedRun<'a> {
 #[derive(Clone, Debug, Default)]
 pub struct DeckSource {
     /// The text, with the settings of the command line and the rows of short tables
-    pub text: String,
+    pub(crate) text: String,
     /// The long tables
-    pub tables: Vec<TableSource>,
+    pub(crate) tables: Vec<TableSource>,
 }
 
 /// A table beside a deck.
 #[derive(Clone, Debug)]
 pub struct TableSource {
     /// The path of its file
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Its name in the deck, rows and fingerprint
-    pub table: ImportedTable,
+    pub(crate) table: ImportedTable,
 }
 
 /// A wanted accuracy, and what was reached.
 pub struct ReachedAccuracy {
     /// The columns of which an accuracy was wanted
-    pub columns: Vec<ReachedColumn>,
+    pub(crate) columns: Vec<ReachedColumn>,
     /// True if all estimates are at most the wanted errors
-    pub is_reached: bool,
+    pub(crate) is_reached: bool,
     /// The settings of the deck (`KEY=VALUE`) that reach it
-    pub settings: Vec<String>,
+    pub(crate) settings: Vec<String>,
     /// The runs of the search
-    pub runs: usize,
+    pub(crate) runs: usize,
     /// Wall-clock seconds of the search
-    pub seconds: f64,
+    pub(crate) seconds: f64,
     /// Equal and placed elements, where both were looked at
-    pub meshes: Option<ReachedMeshes>,
+    pub(crate) meshes: Option<ReachedMeshes>,
 }
 
 /// Equal elements, and elements placed where the solution varies fast.
 pub struct ReachedMeshes {
     /// The best mesh of equal elements
-    pub equal: ReachedMesh,
+    pub(crate) equal: ReachedMesh,
     /// The best mesh of placed ones, where one was tried
-    pub placed: Option<ReachedMesh>,
+    pub(crate) placed: Option<ReachedMesh>,
     /// The number of placed elements over that of equal ones, as predicted
-    pub predicted: f64,
+    pub(crate) predicted: f64,
     /// True if the placed elements were taken
-    pub is_placed: bool,
+    pub(crate) is_placed: bool,
 }
 
 /// A mesh that a search found.
 pub struct ReachedMesh {
     /// The number of its elements
-    pub elements: usize,
+    pub(crate) elements: usize,
     /// The estimated error of the worst column
-    pub estimate: f64,
+    pub(crate) estimate: f64,
     /// CPU seconds of its run
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 /// The accuracy of a column. Errors are relative to the largest value of the column's kind.
 pub struct ReachedColumn {
     /// The name of the column
-    pub name: String,
+    pub(crate) name: String,
     /// The wanted error
-    pub wanted: f64,
+    pub(crate) wanted: f64,
     /// The estimated error
-    pub estimate: f64,
+    pub(crate) estimate: f64,
 }
 
 /// The content of run.json. Keys that an older version has not written are read as their defaults.
@@ -140,7 +140,7 @@ fn is_zero(count: &u32) -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FileRecord {
     /// The name in the folder of results
-    pub name: String,
+    pub(super) name: String,
     bytes: u64,
     /// XXH3 of 64 bits, in hexadecimal digits
     checksum: String,
@@ -171,13 +171,13 @@ impl FileRecord {
 #[serde(default)]
 pub struct TableRecord {
     /// Its name in the deck
-    pub csv: String,
+    pub(crate) csv: String,
     /// The path of its file; not UTF-8 characters are replaced
-    pub path: String,
+    pub(crate) path: String,
     /// The number of its rows
-    pub rows: usize,
+    rows: usize,
     /// A fingerprint of its file
-    pub hash: String,
+    pub(crate) hash: String,
 }
 
 /// The part of run.json that does not repeat the deck.

@@ -54,9 +54,9 @@ pub struct Solution {
     /// Mesh and solution
     pub analysis: Arc<Analysis>,
     /// Materials
-    pub materials: Vec<Material>,
+    pub(crate) materials: Vec<Material>,
     /// Origin of mesh and solution in the coordinates of the shape
-    pub origin: Point,
+    pub(crate) origin: Point,
 }
 
 /// A shape, ready to be solved.

@@ -125,11 +125,11 @@ pub fn constraints(
 /// The constraints of a scene on the unknowns of its nodes.
 pub struct SceneConstraints {
     /// Supports
-    pub supports: Vec<Support>,
+    pub(super) supports: Vec<Support>,
     /// Motions, and motors of joints to ground
-    pub motions: Vec<Motion>,
+    pub(super) motions: Vec<Motion>,
     /// The tables of the motions
-    pub driven: Vec<DrivenTable>,
+    pub(super) driven: Vec<DrivenTable>,
 }
 
 /// The motor of a joint to ground is a prescribed motion of its node.

@@ -11,15 +11,15 @@ use beamsim_core::tensor::{Mat3, Vec3};
 /// A joint as found on the mesh.
 pub struct FoundJoint<'a> {
     /// The table
-    pub joint: &'a deck::Joint,
+    pub(super) joint: &'a deck::Joint,
     /// The nodes A and B; `None` is ground
-    pub nodes: [Option<usize>; 2],
+    pub(super) nodes: [Option<usize>; 2],
     /// From each node to the joint
-    pub arms: [Vec3; 2],
+    pub(super) arms: [Vec3; 2],
     /// e_1 (the axis), e_2, e_3 as columns
-    pub axes: Mat3,
+    pub(super) axes: Mat3,
     /// Its place at the start
-    pub place: Vec3,
+    pub(super) place: Vec3,
 }
 
 impl FoundJoint<'_> {

@@ -15,13 +15,13 @@ use std::ops::Range;
 #[derive(Clone, Copy)]
 pub struct BeamElement<'m> {
     /// Its number in the scene
-    pub number: usize,
+    pub(crate) number: usize,
     /// Its beam
-    pub beam: &'m MeshBeam,
+    pub(super) beam: &'m MeshBeam,
     /// Indices of its nodes
-    pub nodes: &'m [usize],
+    pub(super) nodes: &'m [usize],
     /// The mesh
-    pub mesh: &'m Mesh,
+    pub(super) mesh: &'m Mesh,
 }
 
 impl BeamElement<'_> {
@@ -99,26 +99,26 @@ pub struct MeshBeam {
     /// Its nodes from start to end
     pub nodes: Vec<usize>,
     /// The fraction of the length of each node
-    pub fractions: Vec<f64>,
+    pub(crate) fractions: Vec<f64>,
     /// The fraction of the length that each number means, where numbers do not count the nodes
-    pub numbered: Option<Vec<f64>>,
+    pub(super) numbered: Option<Vec<f64>>,
     /// The numbers of its elements
-    pub elements: Range<usize>,
+    pub(crate) elements: Range<usize>,
     /// First element of each piece of its centre line, counted from that of the beam, and at last
     /// their number
     piece_starts: Vec<usize>,
     /// The elements of each piece
     divisions: Vec<Division>,
     /// Nodes of an element, less one
-    pub order: usize,
+    pub(crate) order: usize,
     /// Interpolation of rotations
-    pub interpolation: deck::InterpolationWord,
+    pub(super) interpolation: deck::InterpolationWord,
     /// Strain without stress
-    pub free_strain: Option<deck::FreeStrain>,
+    pub(super) free_strain: Option<deck::FreeStrain>,
     /// Its centre line
-    pub line: CentreLine,
+    pub(crate) line: CentreLine,
     /// Its section along the way
-    pub section: SectionCourse,
+    pub(crate) section: SectionCourse,
 }
 
 impl MeshBeam {
@@ -188,9 +188,9 @@ pub struct Mesh {
     /// The node of each named point that is one: the first-named beam's where a joint parts it
     pub points: HashMap<String, usize>,
     /// The node of a point for beams that a joint parted there
-    pub parted: HashMap<(String, String), usize>,
+    pub(crate) parted: HashMap<(String, String), usize>,
     /// Names of nodes: those of their points, or beam and number
-    pub names: Names,
+    pub(super) names: Names,
     slots: u32,
 }
 

@@ -53,33 +53,33 @@ use stress::SectionStresses;
 /// A deck made ready to run.
 pub struct Scene {
     /// Title of the deck
-    pub title: Option<String>,
+    pub(crate) title: Option<String>,
     /// Model and stages
     pub plan: Plan,
     /// The columns of the history
     pub probes: Vec<Probe>,
     /// Each n-th row is written.
-    pub every: usize,
+    pub(crate) every: usize,
     /// True if fields are written for ParaView
-    pub vtk: bool,
+    pub(crate) vtk: bool,
     /// Places at which the largest stresses of a run are followed, if they are
-    pub envelope: Option<Vec<StressPlace>>,
+    pub(crate) envelope: Option<Vec<StressPlace>>,
     /// Places of which resultants are written at the end of each stage, if they are
-    pub profile: Option<Vec<ProfilePlace>>,
+    pub(crate) profile: Option<Vec<ProfilePlace>>,
     /// Expectations
-    pub expectations: Vec<Expectation>,
+    pub(crate) expectations: Vec<Expectation>,
     /// Warnings about the deck itself, where the scene was built by [`from_deck`]
-    pub warnings: Vec<Warning>,
+    pub(crate) warnings: Vec<Warning>,
     /// Effects that act, and those that do not, with the reason
     pub reasons: Vec<Reason>,
     /// Nodes, beams, elements
     pub mesh: Mesh,
     /// Rigid bodies
-    pub bodies: Vec<Body>,
+    pub(crate) bodies: Vec<Body>,
     /// Springs and cables between nodes
-    pub links: Vec<Link>,
+    links: Vec<Link>,
     /// The deck with expressions replaced by numbers
-    pub resolved: serde_json::Value,
+    pub(crate) resolved: serde_json::Value,
     /// Beam elasticity, the source of stress resultants
     elasticity: Vec<Arc<dyn StressField>>,
     /// Surfaces and contacts, for pictures
@@ -126,9 +126,9 @@ impl Scene {
 #[derive(Clone)]
 pub struct Expectation {
     /// The column, failure or warning as it stands in the deck
-    pub name: String,
+    pub(crate) name: String,
     /// Kind, with bounds
-    pub kind: ExpectationKind,
+    pub(crate) kind: ExpectationKind,
     /// Origin of the number
     pub source: Option<String>,
 }
@@ -187,11 +187,11 @@ words! {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Value with its tolerances
-    pub value: Option<Target>,
+    pub(crate) value: Option<Target>,
     /// Upper bound
-    pub below: Option<f64>,
+    pub(crate) below: Option<f64>,
     /// Lower bound
-    pub above: Option<f64>,
+    pub(crate) above: Option<f64>,
 }
 
 words! {

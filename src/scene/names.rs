@@ -63,15 +63,15 @@ pub fn unknown<'a>(kind: &str, name: &Spanned<String>, known: impl Iterator<Item
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spot {
     /// The number of the beam
-    pub beam: usize,
+    pub(crate) beam: usize,
     /// The piece of its centre line
-    pub piece: usize,
+    pub(crate) piece: usize,
     /// The part of the elements of that piece that lie before it, from 0 to 1
-    pub along: f64,
+    pub(crate) along: f64,
     /// True if it is a node
-    pub is_node: bool,
+    pub(crate) is_node: bool,
     /// The number of elements of the piece, where their lengths differ
-    pub graded: Option<usize>,
+    pub(crate) graded: Option<usize>,
 }
 
 impl Mesh {

@@ -23,13 +23,13 @@ const SAME_PLACE: f64 = 1e-9;
 /// Finder of columns by their names.
 pub struct Columns<'a> {
     /// The deck
-    pub deck: &'a Deck,
+    pub(super) deck: &'a Deck,
     /// The mesh
-    pub mesh: &'a Mesh,
+    pub(super) mesh: &'a Mesh,
     /// Elasticity of the scene, for strains and resultants
-    pub elasticity: &'a [Arc<dyn StressField>],
+    pub(super) elasticity: &'a [Arc<dyn StressField>],
     /// Stresses of sections
-    pub stresses: &'a SectionStresses<'a>,
+    pub(super) stresses: &'a SectionStresses<'a>,
 }
 
 impl Columns<'_> {

@@ -28,12 +28,12 @@ const SLOWEST: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub struct Piece {
     /// Start
-    pub start: Vec3,
+    start: Vec3,
     /// End
-    pub end: Vec3,
+    end: Vec3,
     curve: Curve,
     /// Arc length
-    pub length: f64,
+    pub(crate) length: f64,
     /// The vector whose part normal to the tangent is local axis 3
     axis3: Vec3,
 }
@@ -107,9 +107,9 @@ impl Cover {
 #[derive(Clone, Debug)]
 pub struct CentreLine {
     /// The pieces in order
-    pub pieces: Vec<Piece>,
+    pub(crate) pieces: Vec<Piece>,
     /// Arc length of all
-    pub length: f64,
+    pub(crate) length: f64,
     /// Arc length before each piece
     before: Vec<f64>,
     /// Angle of axes 2 and 3 about axis 1

@@ -441,9 +441,9 @@ fn rectangle_shear(depth: f64, width: f64, nu: f64) -> f64 {
 /// that was computed.
 pub struct Closed {
     /// 6x6 stiffness
-    pub stiffness: Matrix6<f64>,
+    pub(super) stiffness: Matrix6<f64>,
     /// 6x6 mass; zero where there is none
-    pub mass: Matrix6<f64>,
+    pub(super) mass: Matrix6<f64>,
 }
 
 impl Closed {

@@ -9,9 +9,9 @@ use beamsim_core::failure::FailureKind;
 /// A deck with its scene.
 pub struct BuiltDeck {
     /// The deck
-    pub deck: Deck,
+    pub(super) deck: Deck,
     /// The scene
-    pub scene: Scene,
+    pub(super) scene: Scene,
 }
 
 impl BuiltDeck {

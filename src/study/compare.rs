@@ -7,13 +7,13 @@ use crate::output::HistoryReader;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// The column
-    pub column: String,
+    pub(crate) column: String,
     /// The number of the worst row, from 1
-    pub row: usize,
+    pub(crate) row: usize,
     /// The value of the first history there
-    pub came: f64,
+    pub(crate) came: f64,
     /// The value of the stored one
-    pub stored: f64,
+    pub(crate) stored: f64,
     /// |came - stored| as a multiple of the allowed difference
     pub ratio: f64,
 }
@@ -24,9 +24,9 @@ pub struct ComparedHistories {
     /// The worst cell of each column of the stored history
     pub columns: Vec<Comparison>,
     /// The names of columns that the stored history lacks
-    pub extra: Vec<String>,
+    pub(crate) extra: Vec<String>,
     /// The names of columns with cells that are NaN in both histories
-    pub nan: Vec<String>,
+    pub(crate) nan: Vec<String>,
 }
 
 /// Compares the columns that `stored` has; a column or row that `came` lacks is an error.

@@ -14,7 +14,7 @@ pub struct Forecast {
     /// The end of the trial run, if it came to one
     pub ended: Option<Result<(), Failure>>,
     /// True if the trial run did any iteration
-    pub computed: bool,
+    pub(crate) computed: bool,
     /// The last moment of the trial run
     pub at: Moment,
 }

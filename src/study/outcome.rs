@@ -12,16 +12,16 @@ use std::time::Instant;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::study) struct StageClock {
     /// The stage, from 1
-    pub stage: usize,
+    pub(super) stage: usize,
     /// The time, or in static stages the load factor
-    pub clock: f64,
+    pub(super) clock: f64,
 }
 
 /// The outputs of a run, and the work it took.
 #[derive(Clone)]
 pub struct Outcome {
     /// Success, or why it failed
-    pub ended: Result<(), Failure>,
+    pub(crate) ended: Result<(), Failure>,
     /// For each stage: true if its clock is the time
     dynamic: Vec<bool>,
     /// The moment of each row
@@ -29,7 +29,7 @@ pub struct Outcome {
     /// The columns of the history, row by row
     pub(in crate::study) rows: Vec<Vec<f64>>,
     /// Modes and critical loads, for their files
-    pub found: ModesWriter,
+    pub(crate) found: ModesWriter,
     /// Modes and critical loads, for the columns after those of the history
     pub(in crate::study) modes: Vec<f64>,
     /// The values of expectations, where a recorder was given
@@ -37,9 +37,9 @@ pub struct Outcome {
     /// Attempts at steps and levels
     pub(in crate::study) attempts: u64,
     /// The work it took
-    pub counters: Counters,
+    pub(crate) counters: Counters,
     /// Wall-clock seconds
-    pub seconds: f64,
+    pub(crate) seconds: f64,
     /// Strains along beams, where a record was given
     pub(in crate::study) strains: Option<StrainRecord>,
 }

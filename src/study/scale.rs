@@ -12,9 +12,9 @@ const ROUND_OFF: f64 = 1e-6;
 #[derive(Clone, Copy)]
 pub(super) struct ScaleRow<'a> {
     /// The number of the first column
-    pub first: usize,
+    pub(super) first: usize,
     /// The numbers
-    pub values: &'a [f64],
+    pub(super) values: &'a [f64],
 }
 
 /// For each column the largest value of its quantity in the whole scene: of all displacements,

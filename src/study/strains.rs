@@ -28,7 +28,7 @@ const ROWS: [usize; 2] = [32, 16];
 #[derive(Clone)]
 pub struct StrainRecord {
     /// The pieces of each beam
-    pub beams: Vec<Vec<Piece>>,
+    pub(super) beams: Vec<Vec<Piece>>,
     /// The number of rows
     rows: usize,
 }
@@ -37,43 +37,43 @@ pub struct StrainRecord {
 #[derive(Clone)]
 pub struct Piece {
     /// Its length
-    pub length: f64,
+    pub(super) length: f64,
     /// The number of its elements
-    pub count: usize,
+    pub(super) count: usize,
     /// The order of its elements
-    pub order: usize,
+    pub(super) order: usize,
     /// Places inside at which an element must end, as fractions
-    pub kept: Vec<f64>,
+    pub(super) kept: Vec<f64>,
     /// The smallest number of equal elements that end at the kept places
-    pub unit: usize,
+    pub(super) unit: usize,
     /// Its parts between the kept places
-    pub segments: Vec<Segment>,
+    pub(super) segments: Vec<Segment>,
 }
 
 /// A part of a piece within which the solution is smooth. Places are fractions of the piece.
 #[derive(Clone)]
 pub struct Segment {
     /// Where it begins
-    pub start: f64,
+    pub(super) start: f64,
     /// Where it ends
-    pub end: f64,
+    pub(super) end: f64,
     /// Its integration points in order
-    pub points: Vec<Point>,
+    pub(super) points: Vec<Point>,
     /// The largest rho so far in each window of neighbouring points
-    pub densities: Vec<f64>,
+    pub(super) densities: Vec<f64>,
 }
 
 /// An integration point.
 #[derive(Clone)]
 pub struct Point {
     /// Its element in the scene
-    pub element: usize,
+    pub(super) element: usize,
     /// Its number in the element
-    pub number: usize,
+    pub(super) number: usize,
     /// Fraction of the piece
-    pub place: f64,
+    pub(super) place: f64,
     /// Section axes as columns
-    pub axes: Mat3,
+    pub(super) axes: Mat3,
 }
 
 /// Strains, then stress resultants, in section axes.

@@ -41,9 +41,9 @@ pub struct Judgement {
     /// The value of the run
     pub came: String,
     /// The difference from the expected value, where there is one
-    pub error: Option<f64>,
+    pub(crate) error: Option<f64>,
     /// The difference over the allowed one, where there is one
-    pub ratio: Option<f64>,
+    pub(crate) ratio: Option<f64>,
     /// True if the expectation holds
     pub holds: bool,
 }

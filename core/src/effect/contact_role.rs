@@ -83,45 +83,45 @@ pub enum ContactChange {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactSurvey {
     /// The largest penetration, or gap with a force, over what is allowed
-    pub violation: f64,
+    pub(crate) violation: f64,
     /// That penetration or gap, a length
-    pub gap: f64,
+    pub(crate) gap: f64,
     /// A slot at that point
-    pub slot: Slot,
+    pub(crate) slot: Slot,
     /// Number of points with a force
-    pub points: usize,
+    pub(crate) points: usize,
 }
 
 /// A penetration of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Penetration {
     /// Name of the contact
-    pub contact: String,
+    pub(crate) contact: String,
     /// Name of the surface, or of the other beam
-    pub surface: String,
+    pub(crate) surface: String,
     /// A slot of a node there
-    pub slot: Slot,
+    pub(crate) slot: Slot,
     /// Its depth, a length
-    pub depth: f64,
+    pub(crate) depth: f64,
 }
 
 /// Forces and gaps of one contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactResultant {
     /// The least gap, negative for a penetration; infinite where nothing has a distance
-    pub gap: f64,
+    pub(crate) gap: f64,
     /// The sum of normal forces
-    pub normal: f64,
+    pub(crate) normal: f64,
     /// The sum of the amounts of friction
-    pub friction: f64,
+    pub(crate) friction: f64,
     /// The force on beams and bodies (global components)
-    pub force: Vec3,
+    pub(crate) force: Vec3,
     /// Its moment about the origin, or about the node that carries the surface
-    pub moment: Vec3,
+    pub(crate) moment: Vec3,
     /// The length of beams in contact
-    pub length: f64,
+    pub(crate) length: f64,
     /// The number of points with a force
-    pub points: usize,
+    pub(crate) points: usize,
     /// The number of points that slide
-    pub sliding: usize,
+    pub(crate) sliding: usize,
 }

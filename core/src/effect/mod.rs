@@ -51,9 +51,9 @@ pub struct Momentum {
     /// First moment of mass: mass times the place of the mass centre
     pub moment: Vec3,
     /// Linear momentum
-    pub linear: Vec3,
+    pub(crate) linear: Vec3,
     /// Angular momentum about the origin
-    pub angular: Vec3,
+    pub(crate) angular: Vec3,
 }
 
 impl Momentum {
@@ -70,9 +70,9 @@ impl Momentum {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RoundOff {
     /// Round-off of a force
-    pub force: f64,
+    pub(crate) force: f64,
     /// Round-off of a moment
-    pub moment: f64,
+    pub(crate) moment: f64,
 }
 
 impl RoundOff {
@@ -89,15 +89,15 @@ pub type SomeIncrements = [(Slot, Vec3)];
 #[derive(Clone, Copy, Debug)]
 pub struct MotorState {
     /// The slot of its multiplier
-    pub slot: Slot,
+    pub(crate) slot: Slot,
     /// The angle in radians, or displacement, at an amplitude of one
-    pub value: f64,
+    pub(crate) value: f64,
     /// The index of its amplitude
-    pub amplitude: usize,
+    pub(crate) amplitude: usize,
     /// True for a motor on an angle, false for one on a slide
-    pub turns: bool,
+    pub(crate) turns: bool,
     /// The rate of angle or slide by the motion of its nodes
-    pub speed: f64,
+    pub(crate) speed: f64,
 }
 
 /// The form of a tangent for all weights.
@@ -193,17 +193,17 @@ pub trait Effect: Send + Sync {
 #[derive(Clone, Copy, Default)]
 pub struct Roles<'a> {
     /// Gaps that multipliers close
-    pub constraint: Option<&'a dyn Constraint>,
+    pub(crate) constraint: Option<&'a dyn Constraint>,
     /// Stresses at integration points
-    pub stresses: Option<&'a dyn StressPoints>,
+    pub(crate) stresses: Option<&'a dyn StressPoints>,
     /// Mass
-    pub masses: Option<&'a dyn Masses>,
+    pub(crate) masses: Option<&'a dyn Masses>,
     /// Coordinates driven from outside
-    pub driven: Option<&'a dyn DrivenCoordinates>,
+    pub(crate) driven: Option<&'a dyn DrivenCoordinates>,
     /// Spins without resistance
-    pub spins: Option<&'a dyn FreeSpins>,
+    pub(crate) spins: Option<&'a dyn FreeSpins>,
     /// Contacts, with a memory from one converged state to the next
-    pub contacts: Option<&'a dyn Contacts>,
+    pub(crate) contacts: Option<&'a dyn Contacts>,
 }
 
 impl Roles<'_> {

@@ -27,7 +27,7 @@ pub struct Guide {
     /// The nodes in their order, two or more
     pub nodes: Vec<GuideNode>,
     /// Arc lengths of the nodes at the start, from the first node along the chords
-    pub knots: Vec<f64>,
+    knots: Vec<f64>,
 }
 
 /// A node on the line of a beam.

@@ -38,7 +38,7 @@ const RELAXATIONS: [f64; 2] = [1.038, 1.271];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lobatto {
     /// h, the length of the step, a time
-    pub length: f64,
+    pub(crate) length: f64,
 }
 
 /// The stages of a step that are solved for.

@@ -86,9 +86,9 @@ pub type Correct<'a> = dyn FnMut(&System, &mut [Vec3]) -> bool + 'a;
 pub(super) struct Scene {
     /// The kind of each slot
     #[serde(skip)]
-    pub kinds: Arc<Vec<SlotKind>>,
+    pub(super) kinds: Arc<Vec<SlotKind>>,
     /// The length of the scene
-    pub length: f64,
+    pub(super) length: f64,
     /// True for each slot whose accelerations are determined by mass
     massive: Vec<bool>,
 }
@@ -104,9 +104,9 @@ impl Scene {
 #[derive(Clone, Copy)]
 pub struct StepEnds<'a> {
     /// The state at the start of the step
-    pub from: &'a State,
+    pub(crate) from: &'a State,
     /// The state at the end of the step
-    pub to: &'a State,
+    pub(crate) to: &'a State,
 }
 
 /// The error of the steps of a stage.

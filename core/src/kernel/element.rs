@@ -52,7 +52,7 @@ pub struct NodeMotion<T = f64> {
 #[derive(Clone, Copy, Debug)]
 pub struct NodePlace<T = f64> {
     /// u
-    pub u: Vec3<T>,
+    pub(crate) u: Vec3<T>,
     /// P, the rotation vector in the chart of the evaluation
     pub p: Vec3<T>,
 }

@@ -19,11 +19,11 @@ pub const STENCIL: usize = 4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuideWeights<T = f64> {
     /// N_k
-    pub values: [T; STENCIL],
+    values: [T; STENCIL],
     /// dN_k/ds, 1/length
-    pub slopes: [T; STENCIL],
+    slopes: [T; STENCIL],
     /// d2N_k/ds2, 1/length^2
-    pub curvatures: [T; STENCIL],
+    curvatures: [T; STENCIL],
 }
 
 /// The nodes on which the line between nodes `element` and `element + 1` depends, of `count` nodes.
@@ -119,9 +119,9 @@ pub struct LinePoint<T = f64> {
     /// x(s)
     pub place: Vec3<T>,
     /// dx/ds
-    pub slope: Vec3<T>,
+    pub(crate) slope: Vec3<T>,
     /// d2x/ds2
-    pub curvature: Vec3<T>,
+    pub(crate) curvature: Vec3<T>,
 }
 
 impl<T: Real> LinePoint<T> {

@@ -80,9 +80,9 @@ enum Rates<T> {
 #[derive(Clone, Copy, Debug)]
 pub struct Derivatives<T = f64> {
     /// dOmega, of the material angular velocity
-    pub d_omega: Mat3<T>,
+    pub(crate) d_omega: Mat3<T>,
     /// dAcc, of the material angular acceleration
-    pub d_acceleration: Mat3<T>,
+    pub(super) d_acceleration: Mat3<T>,
 }
 
 impl<T: Real> Derivatives<T> {
@@ -298,7 +298,7 @@ pub fn drag<T: Real>(
 /// Mass-proportional damping of a beam, force per initial length: see [`drag`].
 pub struct Drag {
     /// alpha, 1/time
-    pub factor: f64,
+    pub(crate) factor: f64,
 }
 
 impl VolumeKernel for Drag {
@@ -373,9 +373,9 @@ pub fn steadily_turned<T: Real>(
 /// of a point is its mass properties and its initial place.
 pub struct SteadilyTurned {
     /// w, the angular velocity of the frame, 1/time
-    pub spin: Vec3,
+    pub(crate) spin: Vec3,
     /// x0, a point on the axis of the frame
-    pub about: Vec3,
+    pub(crate) about: Vec3,
 }
 
 impl VolumeKernel for SteadilyTurned {

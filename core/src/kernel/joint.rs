@@ -58,9 +58,9 @@ pub struct DirectionPair<T = f64> {
 #[derive(Clone, Copy, Debug)]
 pub struct GapFactors {
     /// Factor of the tangent of the gap's forces
-    pub forces: f64,
+    pub(crate) forces: f64,
     /// Factor of the row and the column of the gap's multiplier
-    pub multiplier: f64,
+    pub(crate) multiplier: f64,
 }
 
 impl GapFactors {

@@ -71,7 +71,7 @@ impl Intensity {
 /// Line loads: fixed in space, or turning with the section if `FOLLOWS`.
 pub struct DistributedLoad<'a, const FOLLOWS: bool> {
     /// The amplitudes of the loads at the present time
-    pub amplitudes: &'a [f64],
+    pub(crate) amplitudes: &'a [f64],
 }
 
 impl<const FOLLOWS: bool> VolumeKernel for DistributedLoad<'_, FOLLOWS> {
@@ -112,7 +112,7 @@ impl<const FOLLOWS: bool> VolumeKernel for DistributedLoad<'_, FOLLOWS> {
 /// Weight per initial length. Mass on the centre line needs no rotation and no tangent.
 pub struct Weight {
     /// The acceleration of gravity, spatial
-    pub acceleration: Vec3,
+    pub(crate) acceleration: Vec3,
 }
 
 impl VolumeKernel for Weight {

@@ -45,7 +45,7 @@ pub struct Relative<const N: usize, T = f64> {
 #[derive(Clone, Copy)]
 pub(super) struct Half<T> {
     /// The rotation of h
-    pub rotation: Rotation<T>,
+    pub(super) rotation: Rotation<T>,
     /// c = tan(h/2) / (2h)
     c: T,
     /// dc/dz over z = h.h

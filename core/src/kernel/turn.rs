@@ -83,13 +83,13 @@ pub struct Start {
 #[derive(Clone, Copy, Debug)]
 pub struct StartChange {
     /// The rotation vector by which R0 turns, material
-    pub turned: Vec3,
+    pub(crate) turned: Vec3,
     /// The change of Omega0, material
-    pub omega: Vec3,
+    pub(crate) omega: Vec3,
     /// The change of Acc0, material
-    pub acceleration: Vec3,
+    pub(crate) acceleration: Vec3,
     /// The change of B0, spatial
-    pub algorithmic: Vec3,
+    pub(crate) algorithmic: Vec3,
 }
 
 /// The rotation of a node over a time step, as a function of its increment X.

@@ -23,9 +23,9 @@ pub enum Course {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Ramp {
     /// At load factor 0
-    pub from: f64,
+    from: f64,
     /// At load factor 1
-    pub to: f64,
+    to: f64,
 }
 
 impl Ramp {
@@ -138,12 +138,12 @@ impl Amplitude {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StageStart {
     /// From 0
-    pub number: usize,
-    pub kind: StageKind,
+    pub(super) number: usize,
+    pub(super) kind: StageKind,
     /// The run's clock
-    pub time: f64,
+    pub(super) time: f64,
     /// Tells whether loads or motions act for the first time in it
-    pub fresh: bool,
+    pub(super) fresh: bool,
 }
 
 /// The course of a load or a motion in the present stage, and the traces of earlier stages: all of

@@ -85,7 +85,7 @@ pub struct ElementInfo {
     count: u8,
     /// True where it interpolates total rotation vectors, so that all of them must be taken in one
     /// chart
-    pub in_one_chart: bool,
+    in_one_chart: bool,
 }
 
 impl ElementInfo {

@@ -29,9 +29,9 @@ pub struct Jump {
     /// The number of the motion in the deck
     pub motion: usize,
     /// Where the node is
-    pub from: f64,
+    pub(crate) from: f64,
     /// Where the motion begins
-    pub to: f64,
+    pub(crate) to: f64,
 }
 
 /// A motor that would have to jump when a dynamic stage begins.
@@ -40,11 +40,11 @@ pub struct MotorJump {
     /// The slot of its multiplier
     pub slot: Slot,
     /// The number of its amplitude
-    pub amplitude: usize,
+    pub(crate) amplitude: usize,
     /// True where it turns, false where it slides
-    pub turns: bool,
+    pub(crate) turns: bool,
     /// The angle or displacement that it has reached
-    pub from: f64,
+    pub(crate) from: f64,
     /// Where it begins
-    pub to: f64,
+    pub(crate) to: f64,
 }

@@ -20,7 +20,7 @@ use crate::tensor::{Mat3, Vec3};
 #[derive(Clone, Copy, Debug)]
 pub struct Rotation<T = f64> {
     /// The rotation vector P (global components; material and spatial ones agree, since R P = P).
-    pub p: Vec3<T>,
+    pub(crate) p: Vec3<T>,
     /// R, the rotation tensor: material to spatial.
     pub r: Mat3<T>,
     /// T, from the rate of P to the material spin: Omega = T dP/dt, K = T dP/ds.

@@ -22,14 +22,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Deserialize, Serialize)]
 pub(super) struct RunState {
     /// The courses of loads and motions
-    pub schedule: Schedule,
-    pub state: State,
+    pub(super) schedule: Schedule,
+    pub(super) state: State,
     /// The last converged state
-    pub good: State,
-    pub counters: Counters,
-    pub issued: IssuedWarnings,
-    pub bookkeeper: Bookkeeper,
-    pub past: EarlierStages,
+    pub(super) good: State,
+    pub(super) counters: Counters,
+    pub(super) issued: IssuedWarnings,
+    pub(super) bookkeeper: Bookkeeper,
+    pub(super) past: EarlierStages,
 }
 
 impl RunState {
@@ -79,29 +79,29 @@ impl Checkpoint {
 #[derive(Deserialize, Serialize)]
 pub(super) struct StageCheckpoint {
     /// The stage is treated in the plane of the scene.
-    pub is_planar: bool,
+    pub(super) is_planar: bool,
     /// Loads act for the first time in it.
-    pub fresh: bool,
+    pub(super) fresh: bool,
     /// Round-off takes the stiffness of the softest motion.
-    pub soft: bool,
+    pub(super) soft: bool,
     /// Attempts that earlier stages have taken back
-    pub cutbacks_before: u64,
+    pub(super) cutbacks_before: u64,
     /// Increments of prescribed directions, see [`StageRun`](super::stage_run::StageRun)
-    pub prescribed_increment: Vec<Vec3>,
+    pub(super) prescribed_increment: Vec<Vec3>,
     /// The numbers of evaluated instances, by effect
-    pub evaluations: Vec<u64>,
-    pub linear: Option<LinearCheckpoint>,
-    pub newton: NewtonMemory,
-    pub analysis: AnalysisCheckpoint,
+    pub(super) evaluations: Vec<u64>,
+    pub(super) linear: Option<LinearCheckpoint>,
+    pub(super) newton: NewtonMemory,
+    pub(super) analysis: AnalysisCheckpoint,
 }
 
 /// A linear stage between two rows.
 #[derive(Deserialize, Serialize)]
 pub(super) struct LinearCheckpoint {
     /// The state of linearisation, with the clock and the loads of the start of the stage
-    pub origin: State,
+    pub(super) origin: State,
     /// The weights of the tangent that is factorised
-    pub factorised: Option<Weights>,
+    pub(super) factorised: Option<Weights>,
 }
 
 /// An analysis between two rows.

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Default, Deserialize, Serialize)]
 pub(super) struct EarlierStages {
     /// The first row is written.
-    pub started: bool,
+    pub(super) started: bool,
     /// A dynamic stage has begun.
-    pub moving: bool,
+    pub(super) moving: bool,
     /// The state in which the first linear stage began
-    pub origin: Option<State>,
+    pub(super) origin: Option<State>,
 }

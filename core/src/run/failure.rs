@@ -34,9 +34,9 @@ pub struct Attempts {
     /// Attempts that were taken back
     pub cutbacks: u64,
     /// Round-off takes the stiffness of the softest motion.
-    pub soft: bool,
+    pub(super) soft: bool,
     /// Contacts touch in the last balance.
-    pub touches: bool,
+    pub(super) touches: bool,
     /// Beams touch beams there.
     pub beams_touch: bool,
 }

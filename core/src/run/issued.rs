@@ -6,24 +6,24 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(super) struct IssuedWarnings {
     /// That an element turns far from node to node
-    pub coarse: bool,
+    pub(super) coarse: bool,
     /// How many limit and branch points
-    pub points: usize,
+    pub(super) points: usize,
     /// How uncertain round-off leaves displacements; below the first value nothing is worth a
     /// warning.
-    pub uncertainty: f64,
+    pub(super) uncertainty: f64,
     /// By how much strains depend on the orientation; below the first value nothing is worth a
     /// warning.
-    pub frame: f64,
-    pub soft: bool,
-    pub axis: bool,
-    pub subdivision: bool,
+    pub(super) frame: f64,
+    pub(super) soft: bool,
+    pub(super) axis: bool,
+    pub(super) subdivision: bool,
     /// How far a node has gone in a dynamic stage of fixed steps
-    pub moved: f64,
+    pub(super) moved: f64,
     /// That the account of the energy is off
-    pub unbalanced: bool,
+    pub(super) unbalanced: bool,
     /// The stage in which the plane would be left
-    pub unstable: Option<usize>,
+    pub(super) unstable: Option<usize>,
 }
 
 impl Default for IssuedWarnings {

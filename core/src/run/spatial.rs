@@ -9,8 +9,8 @@ use crate::warning::WarningKind;
 
 /// A stage in space, which is treated in a plane.
 pub(super) struct InSpace {
-    pub assembly: Assembly,
-    pub solver: LinearSolver,
+    pub(super) assembly: Assembly,
+    pub(super) solver: LinearSolver,
 }
 
 impl InSpace {

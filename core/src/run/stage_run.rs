@@ -34,12 +34,12 @@ pub(super) trait Analysis<'r> {
 
 /// Tells an observer how far a run has come, while the stage is in use.
 pub(super) struct Teller<'t> {
-    pub observer: &'t mut dyn Observer,
-    pub at: Moment,
+    pub(super) observer: &'t mut dyn Observer,
+    pub(super) at: Moment,
     /// The stage, from 0
-    pub number: usize,
+    pub(super) number: usize,
     /// The number of stages
-    pub stages: usize,
+    pub(super) stages: usize,
 }
 
 impl Teller<'_> {
@@ -52,46 +52,46 @@ impl Teller<'_> {
 
 /// A stage in progress.
 pub(super) struct StageRun<'r> {
-    pub plan: &'r Plan,
+    pub(super) plan: &'r Plan,
     /// From 0
-    pub number: usize,
-    pub model: &'r Model,
+    pub(super) number: usize,
+    pub(super) model: &'r Model,
     /// The rotations and elements that have charts in the stage: none where it is linear
-    pub charted: &'r Charted,
+    pub(super) charted: &'r Charted,
     /// The courses of loads and motions
-    pub schedule: &'r mut Schedule,
-    pub state: &'r mut State,
+    pub(super) schedule: &'r mut Schedule,
+    pub(super) state: &'r mut State,
     /// The last converged state, to go back to
-    pub good: &'r mut State,
-    pub observer: &'r mut dyn Observer,
-    pub counters: &'r mut Counters,
-    pub issued: &'r mut IssuedWarnings,
-    pub bookkeeper: &'r mut Bookkeeper,
-    pub past: &'r mut EarlierStages,
-    pub assembly: Assembly,
-    pub newton: Newton,
+    pub(super) good: &'r mut State,
+    pub(super) observer: &'r mut dyn Observer,
+    pub(super) counters: &'r mut Counters,
+    pub(super) issued: &'r mut IssuedWarnings,
+    pub(super) bookkeeper: &'r mut Bookkeeper,
+    pub(super) past: &'r mut EarlierStages,
+    pub(super) assembly: Assembly,
+    pub(super) newton: Newton,
     /// The plane that the stage is treated in
-    pub plane: Option<Plane>,
+    pub(super) plane: Option<Plane>,
     /// Loads act for the first time in this stage.
-    pub fresh: bool,
+    pub(super) fresh: bool,
     /// Round-off takes the stiffness of the softest motion.
-    pub soft: bool,
+    pub(super) soft: bool,
     /// Energies are counted, since somebody asks for them or watches them.
-    pub keeps_account: bool,
+    pub(super) keeps_account: bool,
     /// Increments of prescribed directions in a load step, or over a unit of load; known where
     /// there are any
-    pub prescribed_increment: Vec<Vec3>,
+    pub(super) prescribed_increment: Vec<Vec3>,
     /// Attempts that earlier stages have taken back
-    pub cutbacks_before: u64,
+    pub(super) cutbacks_before: u64,
     /// The unknowns of the last balance before it was flattened, which its stiffness belongs to; in
     /// static stages in tilted planes
-    pub unflattened: Vec<Vec3>,
+    pub(super) unflattened: Vec<Vec3>,
     /// Changes of contacts in the present step
-    pub contact_change: ContactChange,
+    pub(super) contact_change: ContactChange,
     /// Where a checkpoint has left the stage; taken by its analysis
-    pub resumed: Option<AnalysisCheckpoint>,
+    pub(super) resumed: Option<AnalysisCheckpoint>,
     /// The analysis is at its end, and judged.
-    pub is_judged: bool,
+    pub(super) is_judged: bool,
 }
 
 /// Newton's iteration on the system of a stage.

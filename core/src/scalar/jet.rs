@@ -9,11 +9,11 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jet {
     /// The value
-    pub value: f64,
+    pub(crate) value: f64,
     /// The first derivative over time
-    pub rate: f64,
+    pub(crate) rate: f64,
     /// The second derivative over time
-    pub rate2: f64,
+    pub(crate) rate2: f64,
 }
 
 impl Jet {

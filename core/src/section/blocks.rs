@@ -13,11 +13,11 @@ use std::collections::HashMap;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arc {
     /// Its centre
-    pub centre: Point,
+    pub(super) centre: Point,
     /// Half axes along 2 and 3
-    pub semi_axes: [f64; 2],
+    pub(super) semi_axes: [f64; 2],
     /// Parameter at the start and at the end, rad
-    pub angles: [f64; 2],
+    pub(super) angles: [f64; 2],
 }
 
 impl Arc {

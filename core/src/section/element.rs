@@ -85,26 +85,26 @@ impl ElementKind {
 #[derive(Clone, Copy, Debug)]
 pub struct ReferencePoint {
     /// Weight of integration over the reference element
-    pub weight: f64,
+    weight: f64,
     /// Shape functions
-    pub shape: [f64; MAX_NODES],
+    pub(super) shape: [f64; MAX_NODES],
     /// Derivatives by the first and second reference coordinate
-    pub derivatives: [[f64; 2]; MAX_NODES],
+    pub(super) derivatives: [[f64; 2]; MAX_NODES],
 }
 
 /// Shape functions at a point of an element of the section.
 #[derive(Clone, Copy, Debug)]
 pub struct SectionPoint {
     /// Area of the point: weight times determinant
-    pub area: f64,
+    pub(super) area: f64,
     /// Determinant of the map from the reference element
-    pub determinant: f64,
+    pub(super) determinant: f64,
     /// The point
-    pub at: Point,
+    pub(super) at: Point,
     /// Shape functions
-    pub shape: [f64; MAX_NODES],
+    pub(super) shape: [f64; MAX_NODES],
     /// Derivatives by axes 2 and 3
-    pub gradient: [[f64; 2]; MAX_NODES],
+    pub(super) gradient: [[f64; 2]; MAX_NODES],
 }
 
 impl SectionPoint {

@@ -26,9 +26,9 @@ pub struct Rect {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fineness {
     /// Cells of a line with nothing special at its ends
-    pub least: f64,
+    pub(super) least: f64,
     /// Cells that an end adds over the thickness of a wall
-    pub density: f64,
+    pub(super) density: f64,
 }
 
 /// Fineness grows by this factor from level to level

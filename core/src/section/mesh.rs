@@ -64,7 +64,7 @@ pub struct Element {
     /// Its nodes; those beyond the number of its kind are zero
     pub nodes: [u32; MAX_NODES],
     /// Index of its region
-    pub region: u32,
+    pub(super) region: u32,
 }
 
 impl Element {

@@ -27,9 +27,9 @@ pub enum Side {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
     /// Ends of sides
-    pub points: Vec<Point>,
+    pub(super) points: Vec<Point>,
     /// Sides
-    pub sides: Vec<Side>,
+    pub(super) sides: Vec<Side>,
 }
 
 impl Outline {

@@ -166,7 +166,7 @@ pub struct Recovery {
 pub struct PointStress {
     /// Stresses under unit resultants, by columns, in the order 11 22 33 23 13 12: in section axes,
     /// or in those of an oriented material
-    pub unit: Matrix6,
+    pub(crate) unit: Matrix6,
 }
 
 /// The stresses of a section at a place of a beam: the section may lie beside the line of the beam,

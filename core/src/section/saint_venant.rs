@@ -161,8 +161,6 @@ pub struct Solution {
     pub compliance: Matrix6,
     /// Resultants of unit strains of the beam
     pub stiffness: Matrix6,
-    /// Stiffness for G1, K1, K2, K3 in the theory without shear strain
-    pub classical: Matrix4<f64>,
     /// Mass per length, about the reference point
     pub mass: Matrix6,
     /// Area
@@ -232,7 +230,6 @@ pub fn solve(mesh: &Mesh, materials: &[Material]) -> Result<Solution, SectionErr
     let solution = Solution {
         compliance: Matrix6::zeros(),
         stiffness: Matrix6::zeros(),
-        classical,
         mass: assembled.mass,
         area: assembled.area,
         centroid: assembled.first_moment.map(|moment| moment / assembled.area),

@@ -40,9 +40,9 @@ pub struct Spread(Vec<[f64; 6]>);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Value of the measure
-    pub value: f64,
+    pub(super) value: f64,
     /// Number of the point
-    pub point: usize,
+    pub(super) point: usize,
 }
 
 impl PointTree {

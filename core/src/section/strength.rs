@@ -65,7 +65,7 @@ pub struct FailureLaw {
     /// Strengths in the axes of the material, after Tsai and Wu
     pub strengths: Option<Strengths>,
     /// Strain along the fibre per stress in material axes, over the largest strain
-    pub fibre_strain: Option<Vector6>,
+    pub(crate) fibre_strain: Option<Vector6>,
 }
 
 impl FailureLaw {

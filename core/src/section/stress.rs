@@ -64,11 +64,11 @@ pub struct Probe {
     /// Index of the region
     pub region: usize,
     /// Stresses of the six unit resultants in section axes, by columns
-    pub unit: Matrix6,
+    pub(super) unit: Matrix6,
     /// Angle of the wall tangent, rad
-    pub beta: f64,
+    pub(super) beta: f64,
     /// Angle of the fibre, rad
-    pub theta: f64,
+    pub(super) theta: f64,
 }
 
 impl NodalStresses {

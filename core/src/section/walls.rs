@@ -73,9 +73,9 @@ pub struct Wall {
     /// Indices of its points
     pub ends: [usize; 2],
     /// Its curve, if it is not straight
-    pub bend: Option<Bend>,
+    bend: Option<Bend>,
     /// Distance from the line between the points to the left face, looking along the wall
-    pub left: f64,
+    left: f64,
     /// Plies from left to right; a clockwise closed line has its outside on the left
     pub plies: Vec<Ply>,
 }

@@ -35,16 +35,16 @@ const ROUND_OFF_FACTOR: f64 = 4.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual {
     /// Size of the residual over its tolerance
-    pub ratio: f64,
+    pub(crate) ratio: f64,
     /// Slot of the residual
-    pub slot: Slot,
+    pub(crate) slot: Slot,
     /// Free component of the residual at the slot (global components): a force, or a moment
     /// conjugate to the rotation vector
-    pub value: Vec3,
+    pub(crate) value: Vec3,
     /// Force F that the tolerance refers to
-    pub force: f64,
+    pub(crate) force: f64,
     /// True if some residual is tolerated for its round-off only
-    pub noisy: bool,
+    noisy: bool,
 }
 
 /// Verdict of the stop test.
@@ -64,9 +64,9 @@ pub enum Verdict {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judgement {
     /// Verdict
-    pub verdict: Verdict,
+    pub(crate) verdict: Verdict,
     /// Largest residual, relative to its tolerance
-    pub residual: Residual,
+    pub(crate) residual: Residual,
 }
 
 impl Convergence {

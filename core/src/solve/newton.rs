@@ -26,7 +26,7 @@ pub struct Newton {
     /// Stop test
     pub(crate) convergence: Convergence,
     /// Largest number of linear solves in a solution
-    pub max_iterations: usize,
+    pub(crate) max_iterations: usize,
     /// Linear solver
     pub solver: LinearSolver,
     pub(super) dq: Vec<Vec3>,

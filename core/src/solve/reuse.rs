@@ -23,7 +23,7 @@ const CHEAP_CORRECTIONS: i32 = 2;
 #[derive(Debug)]
 pub(super) struct Reuse {
     /// Largest residual of each iterate of the current solution, relative to its tolerance
-    pub history: Vec<f64>,
+    pub(super) history: Vec<f64>,
     /// True if the current tangent is that of an iterate nearby
     kept: bool,
     /// True if the residual of the current iterate is round-off
@@ -35,7 +35,7 @@ pub(super) struct Reuse {
     /// Number of tangents that the current solution has required so far
     needed: usize,
     /// Number of tangents that the last solution has required; `usize::MAX` before the first
-    pub before: usize,
+    pub(super) before: usize,
 }
 
 impl Reuse {

@@ -34,7 +34,7 @@ impl ResidualBuffer {
 #[derive(Clone, Copy)]
 pub struct Matrix<'a> {
     /// Sparsity pattern of the values
-    pub pattern: &'a Pattern,
+    pub(crate) pattern: &'a Pattern,
     values: &'a [f64],
     holds_factors: bool,
 }
@@ -82,7 +82,7 @@ pub struct System {
     /// with weights, unless [factors](System::holds_factors) have overwritten them.
     pub values: Vec<f64>,
     /// Number of changes of the tangent so far, by which factorisations recognise it
-    pub revision: u64,
+    pub(crate) revision: u64,
     /// True if factors have overwritten the diagonal tiles.
     holds_factors: bool,
     /// Prescribed increments of held directions, by slot (global components). The tangent times

@@ -21,24 +21,24 @@ pub struct ContactMemory {
     /// The law of normal forces
     pub regime: ContactRegime,
     /// Factor on the first stiffness of contacts with which a load level begins
-    pub first_factor: f64,
+    pub(crate) first_factor: f64,
     /// Present factor on the first stiffness of contacts
-    pub factor: f64,
+    pub(crate) factor: f64,
     /// True if points that slid go on sliding in the first tangent of a level
-    pub goes_on: bool,
+    pub(crate) goes_on: bool,
     /// Energy that friction and damping of contacts have taken since the start of the run
-    pub dissipated: f64,
+    pub(crate) dissipated: f64,
     /// Energy per time that the damping of contacts takes
-    pub damping_power: f64,
+    pub(crate) damping_power: f64,
     /// The largest penetration in the present dynamic stage, over the one that is allowed
-    pub deepest: f64,
+    pub(crate) deepest: f64,
     /// The number of steps of the shortest contact in the present dynamic stage, from the step with
     /// its first force to the last one; none if no contact has ended
-    pub shortest: Option<u32>,
+    pub(crate) shortest: Option<u32>,
     /// True if nothing was near to anything at the last converged state, and nothing rubs
     pub is_clear: bool,
     /// Contacts of each chain: a beam or a body against a surface
-    pub chains: Arc<Vec<ChainMemory>>,
+    pub(crate) chains: Arc<Vec<ChainMemory>>,
     /// Pairs of beam elements, and their contacts
     pub pairs: PairsMemory,
 }
@@ -72,42 +72,42 @@ impl ContactMemory {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct ChainMemory {
     /// Points with a force, in the order of their places
-    pub points: Vec<PointMemory>,
+    pub(crate) points: Vec<PointMemory>,
     /// The nodes as the surface saw them at the last converged state; empty without friction, and
     /// before the first state
-    pub nodes: Vec<NodeBefore>,
+    pub(crate) nodes: Vec<NodeBefore>,
 }
 
 /// A contact point with a force.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct PointMemory {
     /// Its place: the number of its element plus the part of that element before it
-    pub place: f64,
+    pub(crate) place: f64,
     /// The number of the edge of a box or a mesh that it touches; otherwise it touches the whole
     /// surface
-    pub edge: Option<u32>,
+    pub(crate) edge: Option<u32>,
     /// p, the normal force
-    pub force: f64,
+    pub(crate) force: f64,
     /// L of the next evaluation in static stages, with which the force of an accepted state is p
-    pub multiplier: f64,
+    pub(crate) multiplier: f64,
     /// g, the gap, a length
-    pub gap: f64,
+    pub(crate) gap: f64,
     /// t0, the traction at the last converged state, in the axes of the surface; of beams in global
     /// axes
-    pub traction: Vec3,
+    pub(crate) traction: Vec3,
     /// n0, the normal at the last converged state, in the same axes
-    pub normal: Vec3,
+    pub(crate) normal: Vec3,
     /// True if it slid at the last converged state
-    pub slides: bool,
+    pub(crate) slides: bool,
     /// The gap at which the penalty begins, a length: a dynamic stage begins with the forces of the
     /// static one before
-    pub offset: f64,
+    pub(crate) offset: f64,
     /// The number of steps of a dynamic stage in contact
-    pub steps: u32,
+    pub(crate) steps: u32,
     /// The force on the beam or body (global components)
-    pub push: Vec3,
+    pub(crate) push: Vec3,
     /// The place where bodies touch (global components)
-    pub at: Vec3,
+    pub(crate) at: Vec3,
 }
 
 /// Pairs of beam elements near each other, and their contacts.
@@ -117,13 +117,13 @@ pub struct PairsMemory {
     pub list: Arc<Vec<ListedPair>>,
     /// The part of the force of each pair that closest points of both elements carry; nodes carry
     /// the rest. Constant in a step.
-    pub blend: Arc<Vec<f64>>,
+    pub(crate) blend: Arc<Vec<f64>>,
     /// Places of the nodes of all beams when the list was made; empty before the first list
-    pub places: Arc<Vec<Vec3>>,
+    pub(crate) places: Arc<Vec<Vec3>>,
     /// The gap up to which pairs are in the list, a length
-    pub margin: f64,
+    pub(crate) margin: f64,
     /// Points with a force, in the order of their meetings and places
-    pub points: Arc<Vec<PairPointMemory>>,
+    pub(crate) points: Arc<Vec<PairPointMemory>>,
     /// Places and rotations of the nodes of all beams at the last converged state (global axes);
     /// empty without friction, and before the first state
     pub nodes: Arc<Vec<NodeBefore>>,
@@ -133,9 +133,9 @@ pub struct PairsMemory {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 pub struct ListedPair {
     /// Number of the meeting: two beams, or one that meets itself
-    pub meeting: u32,
+    pub(crate) meeting: u32,
     /// Numbers of the elements, each in its beam
-    pub elements: [u32; 2],
+    pub(crate) elements: [u32; 2],
 }
 
 /// The kind of a contact point of two beams.
@@ -153,15 +153,15 @@ pub enum PairPointKind {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct PairPointMemory {
     /// Number of the meeting
-    pub meeting: u32,
+    pub(crate) meeting: u32,
     /// Its kind
-    pub kind: PairPointKind,
+    pub(crate) kind: PairPointKind,
     /// Its place on the second beam: the number of its element plus the part of that element before
     /// it
-    pub on_second: f64,
+    pub(crate) on_second: f64,
     /// The part of the force that it carries
-    pub weight: f64,
+    pub(crate) weight: f64,
     /// Its place on the first beam; its force and its traction (global axes) without the weight, and
     /// the push on the first beam with it
-    pub point: PointMemory,
+    pub(crate) point: PointMemory,
 }

@@ -27,7 +27,7 @@ pub struct Direction {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameConflict {
     /// Slot of the two constraints
-    pub slot: Slot,
+    pub(crate) slot: Slot,
 }
 
 /// Frame number of slots whose local axes are the global ones.

@@ -45,9 +45,9 @@ impl SlotLists {
 /// A row of the tiles of a node block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TileRow {
-    pub node_block: usize,
+    pub(super) node_block: usize,
     /// Row in the tile
-    pub row: usize,
+    pub(super) row: usize,
 }
 
 /// Rows of a tile by slot and direction.

@@ -20,16 +20,16 @@ const _: () = assert!(WIDTH == 3 * SLOTS_PER_BLOCK);
 /// Positions in the tangent of the element blocks of one effect.
 #[derive(Clone, Debug)]
 pub(super) struct ScatterMap {
-    pub connectivity: Connectivity,
+    pub(super) connectivity: Connectivity,
     /// True if every instance couples whole nodes, so that it adds whole tiles.
-    pub whole: bool,
+    pub(super) whole: bool,
     /// Position of each block by instance, then by block row, or [`NOT_KEPT`]. Blocks are tiles if
     /// `whole`, else 3 x 3 blocks of two slots.
-    pub values: Vec<u32>,
+    values: Vec<u32>,
     of_instances: RangeList,
     /// True for instances with a held direction or rotated axes
-    pub special: Vec<bool>,
-    pub ranges: InstanceRanges,
+    pub(super) special: Vec<bool>,
+    pub(super) ranges: InstanceRanges,
 }
 
 impl ScatterMap {
@@ -106,18 +106,18 @@ pub struct Pattern {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct IdleRow {
     /// Node block of the tile, or its row in an elimination
-    pub block_row: u32,
+    pub(crate) block_row: u32,
     /// Row of the tile
-    pub tile_row: u8,
+    pub(crate) tile_row: u8,
 }
 
 /// An off-diagonal tile that couples two regions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CouplingTile {
     /// Node block of its columns
-    pub column: usize,
+    pub(super) column: usize,
     /// Number of the tile
-    pub tile: usize,
+    pub(super) tile: usize,
 }
 
 /// An off-diagonal tile above the diagonal that is not stored.

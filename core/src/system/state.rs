@@ -73,21 +73,21 @@ pub struct State {
     /// Empty as long as no chart has changed: `q` itself is then without jumps.
     pub unwrapped: Vec<Vec3>,
     /// First and second time derivative of each load factor
-    pub amplitude_rates: Vec<[f64; 2]>,
+    pub(crate) amplitude_rates: Vec<[f64; 2]>,
     /// For each slot the inertia and damping force at the end of the motion before a static stage;
     /// empty without such a motion
     pub(crate) fading: Arc<Vec<Fading>>,
     /// Anchor of the artificial resistance while a static stage searches for an equilibrium
     pub(crate) anchor: Option<Arc<Anchor>>,
     /// Angle of each joint spring in rad, continued without jumps, valid at the last converged state
-    pub angles: Vec<f64>,
+    pub(crate) angles: Vec<f64>,
     /// Contacts at the last converged state
     pub contacts: ContactMemory,
     /// For each rotation slot the base of the current time step, during the iterations of a step
     /// whose unknowns are increments: `q` is then the increment, `v` and `a` the material spin and
     /// its rate. Otherwise empty: rotation vectors are total.
     #[serde(skip)]
-    pub turns: Vec<Option<Turn>>,
+    pub(crate) turns: Vec<Option<Turn>>,
 }
 
 impl State {
@@ -266,7 +266,7 @@ impl State {
 #[derive(Clone, Copy, Debug)]
 pub struct RotationRate {
     /// Rate Pd of a total rotation vector, or Xd of an increment
-    pub rate: Vec3,
+    pub(crate) rate: Vec3,
     /// dXd/dX = T^-1 (dOmega - C1(Xd)); `None` for a total rotation vector
     over_unknown: Option<Mat3>,
 }
@@ -292,9 +292,9 @@ impl RotationRate {
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
     /// Remembered stresses, meaningful only while `valid`
-    pub points: Vec<[f64; 6]>,
+    pub(crate) points: Vec<[f64; 6]>,
     /// True if `points` belongs to the current iteration.
-    pub valid: bool,
+    pub(crate) valid: bool,
     /// The pairs of beam elements that the pattern of the assembly has room for
-    pub pairs: Arc<Vec<ListedPair>>,
+    pub(crate) pairs: Arc<Vec<ListedPair>>,
 }

@@ -15,21 +15,21 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Copy, Debug)]
 pub struct Again {
     /// Those that failed
-    pub failed: bool,
+    pub(super) failed: bool,
     /// Those whose process died
-    pub killed: bool,
+    pub(super) killed: bool,
 }
 
 /// A sweep with its place.
 pub struct Plan {
     /// Name of the deck, or of the sweep.toml
-    pub name: String,
+    pub(super) name: String,
     /// The sweep
-    pub sweep: Sweep,
+    pub(super) sweep: Sweep,
     /// Folder of the table
-    pub folder: PathBuf,
+    pub(super) folder: PathBuf,
     /// Results of its points
-    pub store: Store,
+    pub(super) store: Store,
 }
 
 impl Plan {

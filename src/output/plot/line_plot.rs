@@ -4,26 +4,26 @@
 #[derive(Clone, Debug)]
 pub struct LinePlot {
     /// The title above the plot
-    pub title: String,
+    pub(crate) title: String,
     /// The horizontal axis
-    pub x: Axis,
+    pub(crate) x: Axis,
     /// The vertical axis
-    pub y: Axis,
+    pub(crate) y: Axis,
     /// The lines, the first behind the others
-    pub lines: Vec<Line>,
+    pub(crate) lines: Vec<Line>,
     /// A horizontal line through the whole width
-    pub level: Option<Level>,
+    pub(crate) level: Option<Level>,
     /// Vertical lines through the whole height
-    pub boundaries: Vec<Boundary>,
+    pub(crate) boundaries: Vec<Boundary>,
 }
 
 /// An axis of a plot.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// The title: a quantity with its unit
-    pub title: String,
+    pub(crate) title: String,
     /// The map from values to positions
-    pub scale: Scale,
+    pub(crate) scale: Scale,
 }
 
 /// A map from values to positions on an axis.
@@ -39,15 +39,15 @@ pub enum Scale {
 #[derive(Clone, Debug)]
 pub struct Line {
     /// The name in the legend
-    pub name: String,
+    pub(crate) name: String,
     /// The points of the line, in order
-    pub points: Vec<(f64, f64)>,
+    pub(crate) points: Vec<(f64, f64)>,
     /// Half the height of the error band at each point; `None` without a band
-    pub bars: Option<Vec<f64>>,
+    pub(crate) bars: Option<Vec<f64>>,
     /// Further points of the line's family: small marks that no line joins
-    pub beside: Vec<(f64, f64)>,
+    pub(crate) beside: Vec<(f64, f64)>,
     /// Colour, dashes and marks
-    pub style: LineStyle,
+    pub(crate) style: LineStyle,
 }
 
 /// Colour, dashes and marks of a line.
@@ -70,16 +70,16 @@ pub enum LineStyle {
 #[derive(Clone, Debug)]
 pub struct Level {
     /// The value on the vertical axis
-    pub value: f64,
+    pub(crate) value: f64,
     /// The name in the legend
-    pub name: String,
+    pub(crate) name: String,
 }
 
 /// A position on the horizontal axis, such as the start of a stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Boundary {
     /// The value on the horizontal axis
-    pub at: f64,
+    pub(crate) at: f64,
     /// The name beside the line
-    pub name: String,
+    pub(crate) name: String,
 }

@@ -26,27 +26,27 @@ const SIZE: f64 = 13.0;
 /// A picture of a section.
 pub struct SectionPicture<'a> {
     /// Title
-    pub title: String,
+    pub(crate) title: String,
     /// Mesh
-    pub mesh: &'a Mesh,
+    pub(crate) mesh: &'a Mesh,
     /// Names of the materials of the regions of the mesh, by their index
-    pub materials: Vec<String>,
+    pub(crate) materials: Vec<String>,
     /// Names and places of points, in the coordinates of the mesh
-    pub points: Vec<(&'static str, Point)>,
+    pub(crate) points: Vec<(&'static str, Point)>,
     /// Displacement of each node along axis 1 in the place of the materials
-    pub warping: Option<Vec<f64>>,
+    pub(crate) warping: Option<Vec<f64>>,
     /// Stress of each element in the place of the materials
-    pub stress: Option<StressShade>,
+    pub(crate) stress: Option<StressShade>,
 }
 
 /// Stresses as colours.
 pub struct StressShade {
     /// Stress of each element
-    pub of_elements: Vec<f64>,
+    pub(crate) of_elements: Vec<f64>,
     /// The stress of the full colour
-    pub largest: f64,
+    pub(crate) largest: f64,
     /// Meaning of the full colour
-    pub legend: String,
+    pub(crate) legend: String,
 }
 
 /// From the coordinates of the mesh to pixels.

@@ -54,11 +54,11 @@ const OTHERS: [Colour; 5] = [PAPER, INK, MUTED, GRID, BACKGROUND];
 #[derive(Clone, Copy, Debug)]
 pub struct Stroke {
     /// The colour
-    pub colour: Colour,
+    pub(super) colour: Colour,
     /// The width in pixels
-    pub width: f64,
+    pub(super) width: f64,
     /// Lengths of dashes and gaps in pixels; empty for a solid line
-    pub dashes: &'static str,
+    pub(super) dashes: &'static str,
 }
 
 impl Stroke {
@@ -80,19 +80,19 @@ pub enum Anchor {
 #[derive(Clone, Copy, Debug)]
 pub struct Text<'a> {
     /// The characters
-    pub text: &'a str,
+    pub(super) text: &'a str,
     /// Position of the base line in pixels: to the right, and down
-    pub at: (f64, f64),
+    pub(super) at: (f64, f64),
     /// The font size in pixels
-    pub size: f64,
+    pub(super) size: f64,
     /// The colour
-    pub colour: Colour,
+    pub(super) colour: Colour,
     /// The point of the text at the position
-    pub anchor: Anchor,
+    pub(super) anchor: Anchor,
     /// True if the text reads upward
-    pub upward: bool,
+    pub(super) upward: bool,
     /// The class of the element, for programs that read the picture
-    pub class: &'static str,
+    pub(super) class: &'static str,
 }
 
 /// An SVG file that is being written.

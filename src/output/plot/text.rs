@@ -64,9 +64,9 @@ pub fn wrapped(text: &str, size: f64, room: f64) -> Vec<String> {
 /// A text on one or more lines, in a smaller font if it is long.
 pub struct Block {
     /// The lines of the text
-    pub lines: Vec<String>,
+    pub(super) lines: Vec<String>,
     /// The font size in pixels
-    pub size: f64,
+    pub(super) size: f64,
 }
 
 impl Block {

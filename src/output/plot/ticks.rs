@@ -9,18 +9,18 @@ use super::line_plot::Scale;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tick {
     /// The value on the axis
-    pub value: f64,
+    pub(super) value: f64,
     /// The label, which reads back to the value
-    pub text: String,
+    pub(super) text: String,
 }
 
 /// Ticks of an axis.
 #[derive(Clone, Debug, Default)]
 pub struct Ticks {
     /// Ticks with labels
-    pub labelled: Vec<Tick>,
+    pub(super) labelled: Vec<Tick>,
     /// Values of ticks without labels between them
-    pub minor: Vec<f64>,
+    pub(super) minor: Vec<f64>,
 }
 
 /// Smallest value that is written as a plain decimal; smaller ones have an exponent.

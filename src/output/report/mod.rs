@@ -22,9 +22,9 @@ const MOST_NUMBERS: usize = 2_000_000;
 /// Where a report gets its words from.
 pub struct Report<'a> {
     /// What it is about
-    pub title: &'a str,
+    pub(crate) title: &'a str,
     /// The content of run.json
-    pub record: &'a Record,
+    pub(crate) record: &'a Record,
 }
 
 impl Report<'_> {

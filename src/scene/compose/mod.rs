@@ -45,45 +45,45 @@ pub struct Reason {
 #[derive(Clone)]
 pub struct DrivenTable {
     /// The driven motion or motor
-    pub drives: Driven,
+    pub(super) drives: Driven,
     /// Its name in messages
-    pub what: &'static str,
+    pub(super) what: &'static str,
     /// Its place in the deck
-    pub span: Span,
+    pub(super) span: Span,
     /// Its history, if it has one
-    pub history: Option<HistoryUse>,
+    pub(super) history: Option<HistoryUse>,
 }
 
 /// The effects of a scene with what they need.
 pub struct Composition {
     /// The effects
-    pub effects: Vec<Arc<dyn Effect>>,
+    pub(super) effects: Vec<Arc<dyn Effect>>,
     /// Every effect that beamsim knows, acting or not
-    pub reasons: Vec<Reason>,
+    pub(super) reasons: Vec<Reason>,
     /// The factors of loads and springs
-    pub amplitudes: Vec<Amplitude>,
+    pub(super) amplitudes: Vec<Amplitude>,
     /// The elasticity, for resultants
-    pub elasticity: Vec<Arc<dyn StressField>>,
+    pub(super) elasticity: Vec<Arc<dyn StressField>>,
     /// Surfaces and contacts, for pictures
     pub contacts: Option<Arc<SurfaceContacts>>,
     /// Rigid bodies
-    pub bodies: Vec<Body>,
+    pub(super) bodies: Vec<Body>,
     /// Springs and cables between nodes
-    pub links: Vec<Link>,
+    pub(super) links: Vec<Link>,
     /// Springs to ground
-    pub springs: Vec<GroundSpring>,
+    pub(super) springs: Vec<GroundSpring>,
     /// Slots of multipliers, behind those of the mesh: what they hold, and the joint
-    pub multipliers: Vec<(SlotKind, String)>,
+    pub(super) multipliers: Vec<(SlotKind, String)>,
     /// Components of these that nothing uses
-    pub idle_multipliers: Vec<Support>,
+    pub(super) idle_multipliers: Vec<Support>,
     /// Prescribed sliding
-    pub slider_motions: Vec<SliderMotion>,
+    pub(super) slider_motions: Vec<SliderMotion>,
     /// Nodes whose rotation a joint takes hold of
-    pub jointed: Vec<usize>,
+    pub(super) jointed: Vec<usize>,
     /// Tables that histories drive, but for motions
-    pub driven: Vec<DrivenTable>,
+    pub(super) driven: Vec<DrivenTable>,
     /// The slots of the rotations on both sides of each of them
-    pub sprung_joints: Vec<[Option<Slot>; 2]>,
+    pub(super) sprung_joints: Vec<[Option<Slot>; 2]>,
 }
 
 /// Tables with the same key share an amplitude: the history with its stages, and the stages of the

@@ -17,9 +17,9 @@ const OFF_THE_LINE: f64 = 1e-3;
 #[derive(Clone)]
 pub struct SliderMotion {
     /// The motion
-    pub motion: Motion,
+    pub(crate) motion: Motion,
     /// The table, whose driven motion gets its number later
-    pub table: super::DrivenTable,
+    pub(crate) table: super::DrivenTable,
 }
 
 impl Composer<'_> {

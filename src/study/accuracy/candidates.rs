@@ -7,9 +7,9 @@ use crate::study::cost::{Pace, Variant};
 /// The error of a variant.
 pub struct Estimate {
     /// The part that comes from the mesh
-    pub mesh: ErrorShare,
+    pub(super) mesh: ErrorShare,
     /// The part that comes from the steps
-    pub step: ErrorShare,
+    pub(super) step: ErrorShare,
 }
 
 impl Estimate {
@@ -22,19 +22,19 @@ impl Estimate {
 /// The errors of the variants of a round.
 pub struct Estimates {
     /// The error of its own variant
-    pub own: Estimate,
+    pub(super) own: Estimate,
     /// The mesh error of the variant on another mesh
-    pub remeshed: Option<ErrorShare>,
+    pub(super) remeshed: Option<ErrorShare>,
 }
 
 /// A variant that is accurate enough.
 pub struct Candidate {
     /// The variant
-    pub variant: Variant,
+    pub(super) variant: Variant,
     /// Its error
-    pub estimate: Estimate,
+    pub(super) estimate: Estimate,
     /// True if the round has run it
-    pub has_run: bool,
+    pub(super) has_run: bool,
 }
 
 impl Estimates {

@@ -13,9 +13,9 @@ const ASSUMED_TIME_ORDER: f64 = 1.5;
 #[derive(Clone, Copy, Debug)]
 pub struct Orders {
     /// The order that estimates assume
-    pub assumed: f64,
+    pub(super) assumed: f64,
     /// The order for smooth solutions, at nodes
-    pub smooth: f64,
+    pub(super) smooth: f64,
 }
 
 /// Kinds of columns by the order of their error over the width of elements.
@@ -103,9 +103,9 @@ impl Source {
 pub struct ErrorShare {
     /// The largest ratio of the error of an output to the wanted error; infinite where it is
     /// unknown
-    pub largest: f64,
+    pub(super) largest: f64,
     /// The error of each output
-    pub columns: Vec<f64>,
+    pub(super) columns: Vec<f64>,
     /// `largest` for the coarser run of the comparison
     largest_of_coarser: f64,
     /// `columns` for the coarser run of the comparison
@@ -262,24 +262,24 @@ fn seen_order(smooth: f64, coarse: Difference, fine: Difference) -> f64 {
 /// A run and a coarser one, which is compared with it.
 pub struct Pair<'a> {
     /// The numbers of the run
-    pub own: &'a Samples,
+    pub(super) own: &'a Samples,
     /// The numbers of the coarser run
-    pub coarser: &'a Samples,
+    pub(super) coarser: &'a Samples,
     /// The width of the elements, or the step, of the run
-    pub width: f64,
+    pub(super) width: f64,
     /// The width of the coarser run over that
-    pub ratio: f64,
+    pub(super) ratio: f64,
 }
 
 /// The outputs whose errors are estimated.
 #[derive(Clone, Copy)]
 pub struct Outputs<'a> {
     /// The compared numbers
-    pub sampler: &'a Sampler,
+    pub(super) sampler: &'a Sampler,
     /// The wanted errors
-    pub wanted: &'a Accuracy,
+    pub(super) wanted: &'a Accuracy,
     /// For each column: true if it lies between nodes of the finer mesh
-    pub between: &'a [bool],
+    pub(super) between: &'a [bool],
 }
 
 impl Outputs<'_> {

@@ -29,9 +29,9 @@ const LEAST_PLACES: usize = 16;
 /// Placed elements, and what they promise.
 pub struct PlacedMesh {
     /// The elements
-    pub placement: Placement,
+    pub(super) placement: Placement,
     /// The number of placed elements over that of equal ones with the same energy of the error
-    pub ratio: f64,
+    pub(super) ratio: f64,
 }
 
 /// The shares of all segments whose densities are known.

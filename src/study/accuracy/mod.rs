@@ -50,14 +50,14 @@ pub struct Found {
     /// The variant of the deck
     pub variant: Variant,
     /// The changes that make it of the deck
-    pub changes: Vec<Change>,
+    changes: Vec<Change>,
     /// True if all estimates are at most the wanted errors
     pub reached: bool,
     /// The names of all outputs
-    pub columns: Vec<String>,
+    pub(crate) columns: Vec<String>,
     /// The estimated error of each, over the largest value of its kind; NaN where there is nothing
     /// to compare
-    pub estimates: Vec<f64>,
+    pub(crate) estimates: Vec<f64>,
     /// The largest ratio of an estimate to the wanted error
     pub ratio: f64,
     /// The failure that stopped the search early
@@ -65,9 +65,9 @@ pub struct Found {
     /// The number of runs
     pub runs: usize,
     /// All outputs of the variant, where they were kept, so that it need not run again
-    pub outcome: Option<Outcome>,
+    pub(crate) outcome: Option<Outcome>,
     /// CPU seconds of its run; NaN where it was not chosen
-    pub seconds: f64,
+    seconds: f64,
     /// Equal and placed elements, where both were looked at
     pub meshes: Option<Meshes>,
 }
@@ -92,13 +92,13 @@ pub struct MeshFound {
     /// The number of elements of all beams
     pub elements: usize,
     /// True if all estimates are at most the wanted errors
-    pub is_reached: bool,
+    pub(crate) is_reached: bool,
     /// The output with the largest ratio of estimate to wanted error
-    pub column: String,
+    pub(crate) column: String,
     /// Its estimated error
-    pub estimate: f64,
+    pub(crate) estimate: f64,
     /// CPU seconds of the run
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 impl Found {

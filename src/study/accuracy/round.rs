@@ -8,32 +8,32 @@ use beamsim_core::failure::FailureKind;
 /// A variant, and those that it is compared with.
 pub struct Round {
     /// The variant
-    pub own: Variant,
+    pub(super) own: Variant,
     /// The variant with a longer step
-    pub longer: Option<Compared>,
+    pub(super) longer: Option<Compared>,
     /// A variant on another mesh. It may have the longer steps, which cost less: the mesh error
     /// hardly depends on the step.
-    pub remeshed: Option<Compared>,
+    pub(super) remeshed: Option<Compared>,
 }
 
 /// A variant that another one is compared with.
 pub struct Compared {
     /// The variant
-    pub variant: Variant,
+    pub(super) variant: Variant,
     /// Its step, or the width of its elements, over that of the other
-    pub ratio: f64,
+    pub(super) ratio: f64,
 }
 
 /// The runs of a round.
 pub struct Trials {
     /// The run of the variant
-    pub own: Trial,
+    pub(super) own: Trial,
     /// The run with a longer step
-    pub longer: Option<Trial>,
+    pub(super) longer: Option<Trial>,
     /// The run on another mesh
-    pub remeshed: Option<Trial>,
+    pub(super) remeshed: Option<Trial>,
     /// The number of runs
-    pub runs: usize,
+    pub(super) runs: usize,
 }
 
 impl Round {

@@ -22,11 +22,11 @@ const TOLERANCES: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 /// The variants of a study: every family on every mesh with every pace, from coarse to fine.
 pub struct Grid {
     /// The families
-    pub families: Vec<Family>,
+    pub(super) families: Vec<Family>,
     /// Factors of the numbers of elements, rising
-    pub meshes: Vec<f64>,
+    pub(super) meshes: Vec<f64>,
     /// The time steps, from coarse to fine
-    pub paces: Vec<Pace>,
+    pub(super) paces: Vec<Pace>,
 }
 
 impl Grid {

@@ -15,23 +15,23 @@ const MOST_PARTS: usize = 8;
 /// A mesh that another one is compared with.
 pub struct Companion {
     /// Elements of each piece of each beam
-    pub elements: Vec<Vec<usize>>,
+    pub(crate) elements: Vec<Vec<usize>>,
     /// The width of its elements over that of the other mesh, at least; below 1 for a finer mesh
-    pub ratio: f64,
+    pub(crate) ratio: f64,
 }
 
 /// Finds meshes of a deck with nodes where something acts.
 pub struct Mesher<'a> {
     /// The deck
-    pub original: Original<'a>,
+    pub(crate) original: Original<'a>,
     /// The outputs that are compared
-    pub sampler: &'a Sampler,
+    pub(crate) sampler: &'a Sampler,
     /// The interpolation of all beams; `None` for those of the deck
-    pub interpolation: Option<InterpolationWord>,
+    pub(crate) interpolation: Option<InterpolationWord>,
     /// True if outputs at nodes of the deck's mesh must be at nodes of other meshes, too
-    pub keeps_places: bool,
+    pub(crate) keeps_places: bool,
     /// The places of the elements; `None` for the shape of the deck's mesh
-    pub placement: Option<Arc<Placement>>,
+    pub(crate) placement: Option<Arc<Placement>>,
 }
 
 impl Mesher<'_> {

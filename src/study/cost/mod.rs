@@ -68,11 +68,11 @@ pub struct Orders {
 /// The study of a scene.
 pub struct CostStudy {
     /// The names of all outputs
-    pub columns: Vec<String>,
+    pub(crate) columns: Vec<String>,
     /// Numbers of those whose error counts
     pub outputs: Vec<usize>,
     /// How errors are measured
-    pub norm: NormWord,
+    pub(crate) norm: NormWord,
     /// True if only the ends of stages have been compared, because runs have no other instants in
     /// common
     pub ends_only: bool,

@@ -11,20 +11,20 @@ const LEAST_ROUNDINGS: f64 = 100.0;
 #[derive(Debug, PartialEq)]
 pub struct Placement {
     /// The pieces of each beam
-    pub beams: Vec<Vec<PlacedPiece>>,
+    pub(crate) beams: Vec<Vec<PlacedPiece>>,
 }
 
 /// The elements of a piece, for any number of them.
 #[derive(Debug, PartialEq)]
 pub struct PlacedPiece {
     /// Its part of all elements of the scene
-    pub share: f64,
+    pub(crate) share: f64,
     /// The shape of its elements, as many small parts
-    pub shape: Division,
+    pub(crate) shape: Division,
     /// Places inside the piece at which an element must end
-    pub kept: Vec<f64>,
+    pub(crate) kept: Vec<f64>,
     /// The number of elements is a multiple of this, so that elements end at the kept places.
-    pub unit: usize,
+    pub(crate) unit: usize,
 }
 
 impl Placement {

@@ -11,9 +11,9 @@ const AT_NODE: f64 = 1e-6;
 #[derive(Clone, Copy)]
 pub struct Piece {
     /// The beam
-    pub beam: usize,
+    pub(super) beam: usize,
     /// The piece
-    pub number: usize,
+    pub(super) number: usize,
 }
 
 /// The positions of columns on beams, where their names have one.

@@ -26,7 +26,7 @@ pub struct CostRun {
     /// The variant
     pub variant: Variant,
     /// The changes that make the variant of the deck
-    pub changes: Vec<Change>,
+    pub(super) changes: Vec<Change>,
     /// The result; `None` where the budget skipped the run
     pub trial: Option<Trial>,
     /// The error of each output; NaN where it cannot be compared
@@ -34,7 +34,7 @@ pub struct CostRun {
     /// The largest of those that count; NaN where the run failed
     pub error: f64,
     /// The time it takes
-    pub timing: Timing,
+    pub(crate) timing: Timing,
     /// True if no other run is both faster and at least as accurate
     pub frontier: bool,
     /// The main source of its error, for runs of the frontier
@@ -45,11 +45,11 @@ pub struct CostRun {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timing {
     /// The median times
-    pub seconds: Seconds,
+    pub(crate) seconds: Seconds,
     /// The largest CPU time less the smallest, over the median
-    pub spread: f64,
+    pub(crate) spread: f64,
     /// How often it ran alone; 0 for a run that was timed once, beside others
-    pub alone: usize,
+    pub(crate) alone: usize,
 }
 
 /// The main source of the error of a run.
@@ -104,7 +104,7 @@ impl CostRun {
 /// The errors of a run against the reference.
 pub(super) struct Errors {
     /// The error of each output; NaN where it cannot be compared
-    pub of_outputs: Vec<f64>,
+    pub(super) of_outputs: Vec<f64>,
     /// The largest error of the outputs that count
-    pub worst: f64,
+    pub(super) worst: f64,
 }

@@ -23,11 +23,11 @@ const SAME: f64 = 1e-9;
 /// Chooses the compared numbers of runs, and measures their differences.
 pub struct Sampler {
     /// The names of all outputs: columns of the history, then modes
-    pub columns: Vec<String>,
+    pub(crate) columns: Vec<String>,
     /// Numbers of the columns whose error counts
-    pub outputs: Vec<usize>,
+    pub(crate) outputs: Vec<usize>,
     /// How differences become one number
-    pub norm: NormWord,
+    pub(super) norm: NormWord,
     /// The number of columns of the history
     of_history: usize,
     /// Diagonal of the scene, to compare translations with rotations
@@ -40,7 +40,7 @@ pub struct Sampler {
     /// True if masses or loads are lumped to nodes of elements with relative rotations
     lumped: bool,
     /// The positions of the columns on beams
-    pub places: Places,
+    pub(super) places: Places,
     /// The compared rows
     rows: ComparedRows,
 }

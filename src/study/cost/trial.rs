@@ -40,7 +40,7 @@ pub struct Trial {
     pub status: String,
     /// The numbers that are compared; empty where the run failed
     #[serde(with = "crate::output::json::exact")]
-    pub samples: Samples,
+    pub(crate) samples: Samples,
     /// Converged levels and steps
     pub steps: u64,
     /// Newton iterations
@@ -48,16 +48,16 @@ pub struct Trial {
     /// Factorisations
     pub factorisations: u64,
     /// The time it took
-    pub seconds: Seconds,
+    pub(super) seconds: Seconds,
 }
 
 /// The time of a run, from the deck to its last row.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
     /// CPU seconds of its thread
-    pub cpu: f64,
+    pub(crate) cpu: f64,
     /// Wall-clock seconds
-    pub wall: f64,
+    pub(super) wall: f64,
 }
 
 impl Trial {

@@ -15,9 +15,9 @@ const LOBATTO_WORK: f64 = 3.0;
 #[derive(Clone, Copy)]
 pub struct Original<'a> {
     /// Its text
-    pub text: &'a str,
+    pub(crate) text: &'a str,
     /// The deck
-    pub deck: &'a Deck,
+    pub(crate) deck: &'a Deck,
 }
 
 impl Original<'_> {
@@ -56,14 +56,14 @@ pub struct Variant {
     /// Order, interpolation and scheme
     pub family: Family,
     /// Elements of each piece of each beam
-    pub elements: Vec<Vec<usize>>,
+    pub(crate) elements: Vec<Vec<usize>>,
     /// The places of their ends; `None` where the shape of the deck's mesh is kept. Then each piece
     /// has its own number of elements.
-    pub placement: Option<Arc<Placement>>,
+    pub(crate) placement: Option<Arc<Placement>>,
     /// The time steps
     pub pace: Pace,
     /// Factor of the tolerances of Newton's method
-    pub newton: f64,
+    pub(crate) newton: f64,
 }
 
 /// The fixed step that is taken: with rows at multiples of an interval, the largest whole part of

@@ -35,10 +35,10 @@ pub struct ReducedScene {
     /// The effects that were switched off
     pub without: Vec<EffectWord>,
     /// The run; `Err` where there is no such scene
-    pub outcome: Result<Outcome, String>,
+    outcome: Result<Outcome, String>,
     /// The change of each column, relative to the largest value of its kind in the whole scene; NaN
     /// where there is nothing to compare, empty where the run failed
-    pub changes: Vec<f64>,
+    changes: Vec<f64>,
 }
 
 /// The study of a scene.
@@ -46,7 +46,7 @@ pub struct EffectStudy {
     /// The names of the columns
     pub columns: Vec<String>,
     /// The run with all effects
-    pub whole: Outcome,
+    pub(crate) whole: Outcome,
     /// The scene without each of its effects, sorted by falling change
     pub reduced: Vec<ReducedScene>,
     /// Effects that can be switched off, but are not in the scene

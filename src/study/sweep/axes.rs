@@ -10,9 +10,9 @@ const MOST_POINTS: usize = 10_000_000;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SweepAxis {
     /// The key, as in `--set`
-    pub key: String,
+    pub(crate) key: String,
     /// Its values
-    pub values: Values,
+    pub(crate) values: Values,
 }
 
 /// Values of a key.
@@ -28,11 +28,11 @@ pub enum Values {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// The first
-    pub from: f64,
+    pub(crate) from: f64,
     /// The last
-    pub to: f64,
+    pub(crate) to: f64,
     /// True if equally spaced values have equal factors
-    pub logarithmic: bool,
+    pub(crate) logarithmic: bool,
 }
 
 /// Combinations of the values of several axes.

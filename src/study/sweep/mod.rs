@@ -29,25 +29,25 @@ pub struct Sweep {
     /// The fingerprint of the deck, which all points share
     common: u64,
     /// The recorded outputs
-    pub outputs: Vec<Looked>,
+    outputs: Vec<Looked>,
     /// True if the errors of the outputs are estimated
-    pub error_bars: bool,
+    error_bars: bool,
     /// The keys that are varied
-    pub keys: Vec<String>,
+    pub(crate) keys: Vec<String>,
     /// The values of the keys, point by point
-    pub points: Vec<Vec<String>>,
+    pub(crate) points: Vec<Vec<String>>,
 }
 
 /// Options for running points.
 pub struct SweepOptions<'a> {
     /// Number of simultaneous points
-    pub threads: usize,
+    pub(crate) threads: usize,
     /// The signal that was caught, if there was one
-    pub interrupted: &'a (dyn Fn() -> Option<i32> + Sync),
+    pub(crate) interrupted: &'a (dyn Fn() -> Option<i32> + Sync),
     /// The list of the points that have begun, for the case that the process dies
-    pub in_flight: Option<&'a InFlight>,
+    pub(crate) in_flight: Option<&'a InFlight>,
     /// Takes each point (from 0) as it ends
-    pub ended: &'a mut dyn FnMut(usize, &PointResult),
+    pub(crate) ended: &'a mut dyn FnMut(usize, &PointResult),
 }
 
 impl Sweep {

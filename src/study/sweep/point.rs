@@ -14,19 +14,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointResult {
     /// `finished`, or a failure's name
-    pub status: String,
+    pub(crate) status: String,
     /// The message of the failure, or the first warning
-    pub message: String,
+    pub(crate) message: String,
     /// The outputs; none where it failed
     #[serde(with = "exact")]
-    pub values: Vec<f64>,
+    pub(super) values: Vec<f64>,
     /// The estimated errors of the outputs, where they are wanted
     #[serde(with = "exact")]
-    pub errors: Vec<f64>,
+    pub(super) errors: Vec<f64>,
     /// Converged levels and steps, Newton iterations, factorisations
-    pub work: [u64; 3],
+    pub(super) work: [u64; 3],
     /// Wall-clock seconds
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 impl PointResult {

@@ -52,14 +52,14 @@ impl Deref for Chain {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
     /// Number of the element in the chain
-    pub element: usize,
+    pub(super) element: usize,
     /// Place on the element, from 0 to 1
-    pub s: f64,
+    pub(super) s: f64,
     /// At a node, or at the closest point
-    pub place: Place,
+    pub(super) place: Place,
     /// The number of the edge of a box or a mesh that it may touch; otherwise it may touch the whole
     /// surface
-    pub edge: Option<u32>,
+    pub(super) edge: Option<u32>,
 }
 
 impl Candidate {

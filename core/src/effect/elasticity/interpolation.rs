@@ -107,9 +107,9 @@ pub struct Scratch<T = f64> {
 /// An element system with its scratch memory, for elements that are computed one by one.
 pub struct Workspace<T = f64> {
     /// The system of the element
-    pub system: ElementSystem<T>,
+    pub(super) system: ElementSystem<T>,
     /// Scratch memory of the interpolation
-    pub scratch: Scratch<T>,
+    pub(super) scratch: Scratch<T>,
 }
 
 impl<T: Real> Workspace<T> {

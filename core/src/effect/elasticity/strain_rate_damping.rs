@@ -29,9 +29,9 @@ use std::sync::Arc;
 /// Strain-rate damping of all beams with the interpolation `I`.
 pub struct StrainRateDamping<I> {
     /// The beams
-    pub elasticity: Arc<BeamElasticity<I>>,
+    pub(super) elasticity: Arc<BeamElasticity<I>>,
     /// Stress per strain rate
-    pub viscosity: Viscosity,
+    pub(super) viscosity: Viscosity,
 }
 
 /// The damping stresses of points over their strain rates.

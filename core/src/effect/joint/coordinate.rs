@@ -10,21 +10,21 @@ use std::f64::consts::PI;
 /// A free coordinate of a joint in some state.
 pub(super) struct Coordinate {
     /// The value of the coordinate: radians, or a length
-    pub value: f64,
+    pub(super) value: f64,
     /// First derivatives over u_A, P_A, u_B, P_B
-    pub gradient: [Vec3; 4],
+    pub(super) gradient: [Vec3; 4],
     /// Second derivatives, as the tangent of a system
-    pub hessian: ElementSystem,
+    pub(super) hessian: ElementSystem,
 }
 
 /// The rate of a free coordinate.
 pub(super) struct Rate {
     /// The rate: radians or a length over time
-    pub value: f64,
+    pub(super) value: f64,
     /// Derivatives of the rate over the rates of the unknowns
-    pub over_rate: [Vec3; 4],
+    pub(super) over_rate: [Vec3; 4],
     /// Derivatives of the rate over the unknowns
-    pub over_unknown: [Vec3; 4],
+    pub(super) over_unknown: [Vec3; 4],
 }
 
 /// An angle in radians less its whole turns, in [-pi, pi].

@@ -39,11 +39,11 @@ pub const MAX_MINIMA: usize = 2 * (MAX_NODES - 1);
 #[derive(Clone, Copy, Debug)]
 pub struct ShapeAt<const N: usize, T = f64> {
     /// N_i
-    pub values: [T; N],
+    pub(crate) values: [T; N],
     /// dN_i/ds
-    pub slopes: [T; N],
+    pub(crate) slopes: [T; N],
     /// d2N_i/ds2
-    pub bends: [T; N],
+    pub(super) bends: [T; N],
 }
 
 impl<const N: usize, T: Real> ShapeAt<N, T> {
@@ -98,9 +98,9 @@ pub enum MinimumKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Minimum {
     /// Its place, in (0, 1)
-    pub s: f64,
+    pub(crate) s: f64,
     /// Its shape
-    pub kind: MinimumKind,
+    pub(crate) kind: MinimumKind,
 }
 
 /// Local minima of the distance along an element, in the order of s.

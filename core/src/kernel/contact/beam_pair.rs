@@ -47,9 +47,9 @@ use crate::tensor::{Mat3, Vec3};
 #[derive(Clone, Copy, Debug)]
 pub struct PairSide<const N: usize, T = f64> {
     /// The nodes; their states before are seen from the carrier of the pair
-    pub nodes: [ContactNode<T>; N],
+    pub(crate) nodes: [ContactNode<T>; N],
     /// The shape functions at the point
-    pub shape: ShapeAt<N, T>,
+    pub(crate) shape: ShapeAt<N, T>,
 }
 
 impl<const N: usize, T: Real> PairSide<N, T> {
@@ -73,20 +73,20 @@ impl<const N: usize, T: Real> PairSide<N, T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairLaw {
     /// r_A and r_B, radii of the sections
-    pub radii: [f64; 2],
+    pub(crate) radii: [f64; 2],
     /// The normal force
-    pub normal: NormalLaw,
+    pub(crate) normal: NormalLaw,
     /// Friction; `None` without
-    pub friction: Option<FrictionLaw>,
+    pub(crate) friction: Option<FrictionLaw>,
     /// The traction on A at the last converged state, in the axes of the carrier
-    pub carried: CarriedTraction,
+    pub(crate) carried: CarriedTraction,
     /// j, the node of B whose rotation carries the pair
-    pub carrier: usize,
+    pub(crate) carrier: usize,
     /// True for parameters s of A and e of B that are those of the closest points; others stay
-    pub free: [bool; 2],
+    pub(crate) free: [bool; 2],
     /// Part of the force that this pair stands for: the weight of a rule, or of a blend. Frozen in a
     /// step.
-    pub weight: f64,
+    pub(crate) weight: f64,
 }
 
 /// The largest number of blocks of a pair: two elements.

@@ -50,13 +50,13 @@ pub enum Undefined {
 #[derive(Clone, Copy, Debug)]
 pub struct Distance<T = f64> {
     /// phi, a length, positive in free space
-    pub value: T,
+    pub(crate) value: T,
     /// n, the gradient of phi, a unit vector into free space, in the axes of the carrier
-    pub normal: Vec3<T>,
+    pub(crate) normal: Vec3<T>,
     /// H, the Hessian of phi, one over length, in the axes of the carrier
-    pub curvature: Mat3<T>,
+    pub(super) curvature: Mat3<T>,
     /// The closest part of the surface
-    pub feature: Feature,
+    pub(super) feature: Feature,
 }
 
 impl<T: Real> Distance<T> {

@@ -10,8 +10,8 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 /// A value with its derivatives over N variables.
 #[derive(Clone, Copy, Debug)]
 pub struct Dual<const N: usize> {
-    pub value: f64,
-    pub partials: [f64; N],
+    pub(crate) value: f64,
+    pub(crate) partials: [f64; N],
 }
 
 impl<const N: usize> Dual<N> {
@@ -186,14 +186,14 @@ impl Random {
 /// Largest errors of forces and tangents over many scenes.
 #[derive(Debug, Default)]
 pub struct Errors {
-    pub count: usize,
-    pub stick: usize,
-    pub slip: usize,
-    pub tangent: f64,
-    pub force_sum: f64,
-    pub moment_sum: f64,
-    pub asymmetry: f64,
-    pub objectivity: f64,
+    pub(super) count: usize,
+    pub(super) stick: usize,
+    pub(super) slip: usize,
+    pub(super) tangent: f64,
+    pub(super) force_sum: f64,
+    pub(super) moment_sum: f64,
+    pub(super) asymmetry: f64,
+    pub(super) objectivity: f64,
 }
 
 /// The largest entry of a tangent, at least one.

@@ -34,22 +34,22 @@ const AT_LIMIT: f64 = 1.0 - 1e-9;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionLaw {
     /// mu
-    pub coefficient: f64,
+    pub(crate) coefficient: f64,
     /// K_t, the stiffness of stick, force per length
-    pub stiffness: f64,
+    pub(crate) stiffness: f64,
 }
 
 /// The traction of a contact at the last converged state. A contact that was open has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CarriedTraction {
     /// t0, force on the first party, in the axes of the carrier at that state
-    pub force: Vec3,
+    pub(crate) force: Vec3,
     /// n0, the normal to which it was tangential
-    pub normal: Vec3,
+    pub(crate) normal: Vec3,
     /// True if it slid: with its force at the limit it goes on sliding in the first tangent of a
     /// step. Otherwise all points would stick there, and a rope that is pulled over a drum would be
     /// torn apart by each first correction.
-    pub slides: bool,
+    pub(crate) slides: bool,
 }
 
 impl CarriedTraction {
@@ -79,21 +79,19 @@ pub enum Status {
 #[derive(Clone, Copy, Debug)]
 pub struct Traction<T = f64> {
     /// t, force on the first party
-    pub force: Vec3<T>,
+    pub(crate) force: Vec3<T>,
     /// Stick or slip
-    pub status: Status,
+    pub(super) status: Status,
     /// u, the tangential sliding since the last converged state
-    pub sliding: Vec3<T>,
-    /// (|t*| - |t|)/K_t, the part of the sliding that is not elastic, a length
-    pub slip: T,
+    pub(crate) sliding: Vec3<T>,
     /// True if the normal has turned by more than 120 degrees: the step is too large
-    pub turned_over: bool,
+    pub(crate) turned_over: bool,
     /// dt/da
-    pub over_sliding: Mat3<T>,
+    pub(super) over_sliding: Mat3<T>,
     /// dt/dn
-    pub over_normal: Mat3<T>,
+    pub(super) over_normal: Mat3<T>,
     /// dt/dp
-    pub over_pressure: Vec3<T>,
+    pub(super) over_pressure: Vec3<T>,
 }
 
 impl<T: Real> Traction<T> {
@@ -104,7 +102,6 @@ impl<T: Real> Traction<T> {
             force: o,
             status: Status::Frictionless,
             sliding: o,
-            slip: T::zero(),
             turned_over: false,
             over_sliding: Mat3::zero(),
             over_normal: Mat3::zero(),
@@ -129,7 +126,6 @@ impl FrictionLaw {
         Traction {
             force: e * limit,
             status: Status::Slides,
-            slip: (size - limit) * (1.0 / self.stiffness),
             over_sliding: across * trial.over_sliding,
             over_normal: across * trial.over_normal,
             over_pressure: e.scale(self.coefficient),

@@ -13,9 +13,9 @@ const LIMIT: i64 = 1 << 20;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
     /// The middle of the element
-    pub middle: Vec3,
+    pub(crate) middle: Vec3,
     /// Half of its extent, its radius for contact, and half of the margin: a length
-    pub reach: f64,
+    pub(crate) reach: f64,
 }
 
 /// Shows each pair of balls that overlap, the smaller number first, in the order of both numbers.

@@ -40,11 +40,11 @@ pub enum NormalLaw {
 #[derive(Clone, Copy, Debug)]
 pub struct NormalForce<T = f64> {
     /// p, not negative
-    pub force: T,
+    pub(crate) force: T,
     /// dp/dg
-    pub over_gap: T,
+    pub(super) over_gap: T,
     /// dp/d(dg/dt)
-    pub over_rate: T,
+    pub(super) over_rate: T,
 }
 
 impl<T: Real> NormalForce<T> {

@@ -5,9 +5,9 @@
 #[derive(Clone, Copy, Debug)]
 pub struct Slopes {
     /// The first derivative
-    pub first: f64,
+    pub(crate) first: f64,
     /// The second derivative
-    pub second: f64,
+    pub(super) second: f64,
 }
 
 /// Parts of the width of a bracket below which a minimum is found.

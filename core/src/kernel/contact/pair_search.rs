@@ -31,20 +31,20 @@ const MAX_ADVANCES: usize = 200;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestPair {
     /// The parameter on A, in [0, 1]
-    pub s: f64,
+    pub(crate) s: f64,
     /// The parameter on B, in [0, 1]
-    pub e: f64,
+    pub(crate) e: f64,
     /// The distance of the points
-    pub distance: f64,
+    pub(crate) distance: f64,
 }
 
 /// Two segments: A from `a[0]` to `a[1]`, B from `b[0]` to `b[1]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Segments {
     /// The ends of A
-    pub a: [Vec3; 2],
+    pub(crate) a: [Vec3; 2],
     /// The ends of B
-    pub b: [Vec3; 2],
+    pub(crate) b: [Vec3; 2],
 }
 
 impl Segments {

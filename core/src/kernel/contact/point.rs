@@ -65,20 +65,20 @@ use crate::tensor::{Mat3, Vec3};
 #[derive(Clone, Copy, Debug)]
 pub struct Carrier<T = f64> {
     /// c, its place, spatial
-    pub place: Vec3<T>,
+    pub(crate) place: Vec3<T>,
     /// dc/dt
-    pub velocity: Vec3<T>,
+    pub(crate) velocity: Vec3<T>,
     /// Its rotation: Q and T_s
-    pub rotation: Rotation<T>,
+    pub(crate) rotation: Rotation<T>,
     /// Omega_s, its material angular velocity
-    pub omega: Vec3<T>,
+    pub(crate) omega: Vec3<T>,
     /// The derivative of Omega_s over the unknown P_s, weighted: s dOmega/dP + d dOmega/dPdot
-    pub omega_derivative: Mat3<T>,
+    pub(crate) omega_derivative: Mat3<T>,
     /// Its place in the coordinates of the surface: the node's initial place
-    pub origin: Vec3,
+    pub(crate) origin: Vec3,
     /// True for a node with unknowns, the last two blocks of the system; false for a surface that is
     /// fixed or moved from outside
-    pub is_node: bool,
+    pub(crate) is_node: bool,
 }
 
 impl<T: Real> Carrier<T> {
@@ -120,28 +120,28 @@ pub enum Place {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactLaw {
     /// r, the radius of the section
-    pub radius: f64,
+    pub(crate) radius: f64,
     /// The normal force
-    pub normal: NormalLaw,
+    pub(crate) normal: NormalLaw,
     /// Friction; `None` without
-    pub friction: Option<FrictionLaw>,
+    pub(crate) friction: Option<FrictionLaw>,
     /// The traction at the last converged state
-    pub carried: CarriedTraction,
+    pub(crate) carried: CarriedTraction,
     /// The place of the point on its element
-    pub place: Place,
+    pub(crate) place: Place,
 }
 
 /// The state of a contact point.
 #[derive(Clone, Copy, Debug)]
 pub struct PointState<T = f64> {
     /// g, the gap, a length
-    pub gap: T,
+    pub(crate) gap: T,
     /// p and its derivatives
-    pub normal_force: NormalForce<T>,
+    pub(crate) normal_force: NormalForce<T>,
     /// n, in the axes of the carrier
-    pub normal: Vec3<T>,
+    pub(crate) normal: Vec3<T>,
     /// t, the force of friction on the element, in the axes of the carrier, and its status
-    pub traction: Traction<T>,
+    pub(crate) traction: Traction<T>,
 }
 
 impl<T: Real> PointState<T> {

@@ -15,9 +15,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct NodeBefore {
     /// y0 = Q0^T (x0 - c0)
-    pub place: Vec3,
+    pub(crate) place: Vec3,
     /// S0 = Q0^T R0
-    pub rotation: Mat3,
+    pub(crate) rotation: Mat3,
 }
 
 impl NodeBefore {
@@ -32,13 +32,13 @@ impl NodeBefore {
 #[derive(Clone, Copy, Debug)]
 pub struct ContactNode<T = f64> {
     /// x, its place, spatial
-    pub place: Vec3<T>,
+    pub(crate) place: Vec3<T>,
     /// dx/dt; zero in statics
-    pub velocity: Vec3<T>,
+    pub(crate) velocity: Vec3<T>,
     /// Its rotation, with the tensor T of the unknown
-    pub rotation: Rotation<T>,
+    pub(crate) rotation: Rotation<T>,
     /// The node at the last converged state; only friction needs it
-    pub before: NodeBefore,
+    pub(crate) before: NodeBefore,
 }
 
 /// Rotations of the nodes as the carrier sees them, for friction.

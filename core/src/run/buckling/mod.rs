@@ -92,9 +92,9 @@ impl PathLimit {
 
 /// A buckling stage.
 pub(super) struct Buckling<'s, 'r> {
-    pub stage: &'s mut StageRun<'r>,
+    pub(super) stage: &'s mut StageRun<'r>,
     /// The number of critical loads that are asked for
-    pub modes: usize,
+    pub(super) modes: usize,
 }
 
 impl<'r> Analysis<'r> for Buckling<'_, 'r> {

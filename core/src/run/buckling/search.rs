@@ -11,8 +11,8 @@ const SEEN: f64 = 1e-3;
 
 /// An estimate of a critical load from the tangent at another load.
 pub struct Sight {
-    pub from: f64,
-    pub critical: f64,
+    pub(super) from: f64,
+    pub(super) critical: f64,
 }
 
 impl Sight {
@@ -24,20 +24,20 @@ impl Sight {
 
 /// A critical load between a state that lies before it and a load that lies beyond.
 pub struct CriticalSearch {
-    pub here: State,
+    pub(super) here: State,
     beyond: Option<f64>,
     /// The state at the load that lies beyond, where load control comes to it
-    pub behind: Option<State>,
+    pub(super) behind: Option<State>,
     /// The estimate from here
-    pub estimate: f64,
+    pub(super) estimate: f64,
     /// How much farther than the estimate the next look goes: it may fall short again and again
     stretch: f64,
-    pub way: f64,
+    pub(super) way: f64,
     /// The estimate from the last point before it
     seen: f64,
     /// How load control went where what lies beyond is known only from that it did not get there,
     /// or not on this branch
-    pub ended: Option<Walked>,
+    pub(super) ended: Option<Walked>,
 }
 
 impl CriticalSearch {

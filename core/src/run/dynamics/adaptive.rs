@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Control {
     /// The method
-    pub scheme: Scheme,
+    pub(super) scheme: Scheme,
     /// The error allowed to a step over its length
     rate: f64,
     length: f64,

@@ -9,14 +9,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Deserialize, Serialize)]
 pub(in crate::run) struct DynamicsCheckpoint {
     /// The length of the last step
-    pub last_length: f64,
-    pub predictor: Predictor,
+    pub(super) last_length: f64,
+    pub(super) predictor: Predictor,
     /// The predictor of the middle of steps, where that is a stage
-    pub of_middle: Option<Predictor>,
-    pub massive: Vec<bool>,
-    pub rateless: Vec<usize>,
-    pub guard: Option<EnergyGuard>,
-    pub steps: StepsCheckpoint,
+    pub(super) of_middle: Option<Predictor>,
+    pub(super) massive: Vec<bool>,
+    pub(super) rateless: Vec<usize>,
+    pub(super) guard: Option<EnergyGuard>,
+    pub(super) steps: StepsCheckpoint,
 }
 
 /// Where the steps of a dynamic stage are.

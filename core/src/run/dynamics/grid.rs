@@ -6,7 +6,7 @@ pub struct Grid {
     start: f64,
     end: f64,
     step: f64,
-    pub steps: u64,
+    pub(super) steps: u64,
 }
 
 impl Grid {

@@ -7,8 +7,8 @@ use crate::system::State;
 /// The middle of steps.
 pub(super) struct Middle {
     /// The state in the middle of the last step, in the charts of the step
-    pub state: State,
-    pub predictor: Predictor,
+    pub(super) state: State,
+    pub(super) predictor: Predictor,
 }
 
 impl Middle {

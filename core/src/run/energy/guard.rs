@@ -35,9 +35,9 @@ struct Balance {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imbalance {
     /// Above zero where energy comes from nothing
-    pub share: f64,
+    pub(crate) share: f64,
     /// The stage itself is to blame, not those before it.
-    pub is_own: bool,
+    pub(crate) is_own: bool,
 }
 
 /// An account that is off by more than this part of the largest energy is told.
@@ -53,8 +53,8 @@ const TO_BLAME: f64 = 0.4;
 
 /// By how much the total has grown, and what that is to be compared with.
 pub struct Growth {
-    pub grown: f64,
-    pub largest: f64,
+    pub(crate) grown: f64,
+    pub(crate) largest: f64,
 }
 
 impl EnergyGuard {

@@ -21,9 +21,9 @@ pub struct Ledger {
     /// Energy taken by damping so far
     pub damped: f64,
     /// Energy stored in contacts: in penalties, and in elastic stick
-    pub contact: f64,
+    pub(crate) contact: f64,
     /// Energy taken by friction and damping of contacts so far
-    pub friction: f64,
+    pub(crate) friction: f64,
 }
 
 impl Ledger {

@@ -24,9 +24,9 @@ const SAME_FREQUENCY: f64 = 1e-7;
 
 /// A modal stage.
 pub(super) struct Modal<'s, 'r> {
-    pub stage: &'s mut StageRun<'r>,
+    pub(super) stage: &'s mut StageRun<'r>,
     /// The number of modes that are asked for
-    pub modes: usize,
+    pub(super) modes: usize,
 }
 
 impl<'r> Analysis<'r> for Modal<'_, 'r> {

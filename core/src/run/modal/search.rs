@@ -32,13 +32,13 @@ const FREE: f64 = 1e-4;
 /// The modes of a stage, and what is known about them.
 #[derive(Default)]
 pub struct Found {
-    pub motions: Vec<SmallMotion>,
+    pub(super) motions: Vec<SmallMotion>,
     /// Rigid motions of free parts
-    pub rigid: usize,
+    pub(super) rigid: usize,
     /// Unstable modes that are known to be there and were not found
-    pub missing: usize,
+    pub(super) missing: usize,
     /// Pivots count more among those that are asked for than were found.
-    pub is_short: bool,
+    pub(super) is_short: bool,
 }
 
 impl Found {
@@ -146,9 +146,9 @@ fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> 
 /// Motions that grow.
 pub struct Growth {
     /// The motions, verified
-    pub growing: Vec<SmallMotion>,
+    pub(super) growing: Vec<SmallMotion>,
     /// False if others may have been missed
-    pub is_sure: bool,
+    pub(super) is_sure: bool,
 }
 
 /// Motions that grow, among the `modes` slowest and among those around shifts further out that these

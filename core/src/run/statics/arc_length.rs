@@ -55,11 +55,11 @@ pub enum Arrival {
 
 /// A static stage by arc length.
 pub(in crate::run) struct ArcLength<'s, 'r> {
-    pub stage: &'s mut StageRun<'r>,
+    pub(crate) stage: &'s mut StageRun<'r>,
     /// The first increment is that of one of so many load levels.
-    pub steps: usize,
+    pub(crate) steps: usize,
     /// Most increments
-    pub max_steps: usize,
+    pub(crate) max_steps: usize,
 }
 
 impl<'r> Analysis<'r> for ArcLength<'_, 'r> {

@@ -10,37 +10,37 @@ use serde::{Deserialize, Serialize};
 #[derive(Deserialize, Serialize)]
 pub(in crate::run) struct LevelsCheckpoint {
     /// The number of levels that are reached
-    pub reached: usize,
+    pub(super) reached: usize,
     pub(super) levels: Levels,
     /// The signs of pivots are followed.
-    pub follows_signs: bool,
+    pub(super) follows_signs: bool,
     /// The stiffness of the last level is the first tangent of the next.
-    pub is_given: bool,
+    pub(super) is_given: bool,
     /// The unknowns that this stiffness belongs to, if they are not those of the state
-    pub unflattened: Vec<Vec3>,
+    pub(super) unflattened: Vec<Vec3>,
     /// The signs of pivots at the last level
-    pub signature: Option<Signature>,
+    pub(super) signature: Option<Signature>,
     /// The signs of pivots before the first level
-    pub at_start: Option<Signature>,
+    pub(super) at_start: Option<Signature>,
 }
 
 /// A stage of arc length between two rows.
 #[derive(Deserialize, Serialize)]
 pub(in crate::run) struct ArcLengthCheckpoint {
-    pub path: Path,
-    pub progress: PathProgress,
+    pub(super) path: Path,
+    pub(super) progress: PathProgress,
 }
 
 /// How far a path has been followed.
 #[derive(Clone, Copy, Deserialize, Serialize)]
 pub(in crate::run) struct PathProgress {
     /// Increments so far
-    pub increments: usize,
+    pub(super) increments: usize,
     /// Of these the last ones that came to no higher load than those before
-    pub in_vain: usize,
+    pub(super) in_vain: usize,
     /// The highest load factor so far
-    pub highest: f64,
-    pub signs: RateSigns,
+    pub(super) highest: f64,
+    pub(super) signs: RateSigns,
 }
 
 impl PathProgress {
@@ -56,7 +56,7 @@ impl PathProgress {
 #[derive(Clone, Copy, Deserialize, Serialize)]
 pub(in crate::run) struct RateSigns {
     /// The load factor grows.
-    pub rising: bool,
+    pub(super) rising: bool,
     /// The displacement that the loads do work on grows.
-    pub working: bool,
+    pub(super) working: bool,
 }

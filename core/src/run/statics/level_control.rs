@@ -45,10 +45,10 @@ enum Reached {
 
 /// A static stage by load levels.
 pub(in crate::run) struct LoadLevels<'s, 'r> {
-    pub stage: &'s mut StageRun<'r>,
+    pub(crate) stage: &'s mut StageRun<'r>,
     /// The number of levels
-    pub steps: usize,
-    pub approach: Approach,
+    pub(crate) steps: usize,
+    pub(crate) approach: Approach,
 }
 
 impl<'r> Analysis<'r> for LoadLevels<'_, 'r> {

@@ -46,11 +46,11 @@ pub(super) enum ReachedBy {
 #[derive(Clone, Deserialize, Serialize)]
 pub(super) struct Levels {
     /// The state before the first
-    pub start: State,
+    pub(super) start: State,
     /// Load factor from one to the next
-    pub level: f64,
-    pub approach: Approach,
-    pub reached_by: ReachedBy,
+    pub(super) level: f64,
+    pub(super) approach: Approach,
+    pub(super) reached_by: ReachedBy,
     /// Load factor from the last good state to the next one
     increment: f64,
 }

@@ -16,9 +16,9 @@ const LOAD_STEP: f64 = 1.0 / 4096.0;
 /// The direction of a path of equilibrium.
 pub(in crate::run) struct PathDirection {
     /// dq/dload
-    pub rate: Vec<Vec3>,
+    pub(crate) rate: Vec<Vec3>,
     /// dg/dload at rest: of the forces, and at multipliers of the gaps of motors
-    pub pull: Vec<Vec3>,
+    pub(super) pull: Vec<Vec3>,
 }
 
 impl PathDirection {

@@ -8,29 +8,29 @@ use serde::{Deserialize, Serialize};
 /// A point of the path and its unit tangent.
 #[derive(Clone, Deserialize, Serialize)]
 pub struct PathPoint {
-    pub state: State,
-    pub tangent: Vec<Vec3>,
+    pub(super) state: State,
+    pub(super) tangent: Vec<Vec3>,
     /// The tangent's part in the load factor
-    pub load_rate: f64,
+    pub(super) load_rate: f64,
     /// The rate of the displacement that the loads do work on
-    pub work_rate: f64,
-    pub signature: Option<Signature>,
+    pub(super) work_rate: f64,
+    pub(super) signature: Option<Signature>,
     /// It is a limit point: one pivot is next to zero, with the sign of round-off
-    pub on_limit: bool,
+    pub(super) on_limit: bool,
 }
 
 /// A path being followed.
 #[derive(Clone, Deserialize, Serialize)]
 pub struct Path {
     /// The load factor at which it was begun
-    pub begun: f64,
-    pub here: PathPoint,
+    pub(super) begun: f64,
+    pub(super) here: PathPoint,
     /// The length of the next step
-    pub length: f64,
+    pub(super) length: f64,
     /// Length of the first step
-    pub first: f64,
+    pub(super) first: f64,
     /// The tangent's part in the load factor at the beginning
-    pub first_rate: f64,
+    pub(super) first_rate: f64,
     /// 1/U^2
-    pub scale: f64,
+    pub(super) scale: f64,
 }

@@ -27,7 +27,7 @@ pub(super) const LARGEST_UNCOUNTED: f64 = 0.5;
 pub(super) struct Stability {
     /// Pivots are followed.
     counts: bool,
-    pub signature: Option<Signature>,
+    pub(super) signature: Option<Signature>,
 }
 
 impl Stability {

@@ -73,26 +73,26 @@ impl BlockSource {
 #[derive(Clone, Debug)]
 pub struct Elimination {
     /// Node block of each row
-    pub order: Vec<u32>,
+    pub(super) order: Vec<u32>,
     /// Row of each node block
-    pub row_of: Vec<u32>,
+    pub(super) row_of: Vec<u32>,
     /// Ranges of rows (subtrees of the elimination tree) that are coupled only through the trunk
     /// and are eliminated in parallel
-    pub branches: Vec<Range<usize>>,
+    pub(super) branches: Vec<Range<usize>>,
     /// Rows after all branches
-    pub trunk: Range<usize>,
+    pub(super) trunk: Range<usize>,
     /// Node blocks of each branch and of the trunk as ranges; empty unless those of each one are
     /// consecutive
-    pub runs: Vec<Range<usize>>,
+    pub(super) runs: Vec<Range<usize>>,
     /// Position in `later` of the first later neighbour of each row
-    pub starts: Vec<u32>,
+    starts: Vec<u32>,
     /// Later neighbours, row by row
-    pub later: Vec<u32>,
+    pub(super) later: Vec<u32>,
     /// Position in `targets` of the first target of each row; empty without targets
     target_starts: Vec<u32>,
     /// Row by row, for each pair of later neighbours a < b, in the order of b and then of a: the
     /// changed block in which they are coupled, by its number among changed blocks
-    pub targets: Vec<u32>,
+    pub(super) targets: Vec<u32>,
     /// Blocks right of the diagonal that elimination changes, ascending
     changed: Vec<u32>,
     /// Sources of the initial values of each changed block and of its mirror image

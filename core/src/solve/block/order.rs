@@ -35,20 +35,20 @@ const NO_ROW: u32 = u32::MAX;
 /// An order of elimination with its branches and fill.
 pub struct EliminationOrder {
     /// Node block of each row
-    pub order: Vec<u32>,
+    pub(super) order: Vec<u32>,
     /// Consecutive row ranges, from the first row on, that are coupled only with later rows after
     /// all of them; empty if parallel elimination does not pay
-    pub branches: Vec<Range<usize>>,
+    pub(super) branches: Vec<Range<usize>>,
     /// Later neighbours of each row
-    pub neighbours: Neighbours,
+    pub(super) neighbours: Neighbours,
 }
 
 /// For each row, the rows that its elimination changes.
 pub struct Neighbours {
     /// Position in `later` of the first neighbour of each row
-    pub starts: Vec<u32>,
+    pub(super) starts: Vec<u32>,
     /// Neighbours of each row, ascending
-    pub later: Vec<u32>,
+    pub(super) later: Vec<u32>,
 }
 
 impl Neighbours {

@@ -28,9 +28,9 @@ macro_rules! run {
 pub struct PivotSigns {
     /// Number of negative pivots; for unsymmetric tangents, of diagonal tiles with negative
     /// determinant
-    pub negative: usize,
+    pub(super) negative: usize,
     /// Number of rows that may have lost digits, or that may cost later rows digits
-    pub doubtful: usize,
+    pub(super) doubtful: usize,
 }
 
 impl AddAssign for PivotSigns {
@@ -113,11 +113,11 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
 
 /// Factors as a piece sees them in a solution.
 pub struct PieceFactors<'a, P: Piece<W>, const W: usize> {
-    pub elimination: &'a Elimination,
+    pub(super) elimination: &'a Elimination,
     /// Off-diagonal tiles of the tangent
-    pub beside: &'a [Tile<W>],
+    pub(super) beside: &'a [Tile<W>],
     /// Diagonal tiles of the factor
-    pub diagonal: Diagonal<'a, &'a [P::DiagonalTile]>,
+    pub(super) diagonal: Diagonal<'a, &'a [P::DiagonalTile]>,
 }
 
 /// Contributions of a branch to the trunk.
@@ -131,9 +131,9 @@ struct TrunkContribution<P: Piece<W>, const W: usize> {
 /// Targets of the contributions to rows after those of a piece.
 pub struct LaterTargets<'a, 's, P: Piece<W>, const W: usize> {
     /// Off-diagonal blocks
-    pub blocks: &'a mut P,
+    pub(super) blocks: &'a mut P,
     /// Diagonal tiles
-    pub diagonal: &'a mut Diagonal<'s, &'s mut [P::DiagonalTile]>,
+    pub(super) diagonal: &'a mut Diagonal<'s, &'s mut [P::DiagonalTile]>,
 }
 
 /// Factors of all branches and of the trunk.

@@ -18,27 +18,27 @@ const AT_NODE: f64 = 1e-6;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Side<const N: usize> {
     /// Places of its nodes
-    pub nodes: [Vec3; N],
+    pub(super) nodes: [Vec3; N],
     /// The derivative of the place at the start of the next element of the beam; of the last element
     /// of a ring, the first one
-    pub next: Option<Vec3>,
+    pub(super) next: Option<Vec3>,
     /// True for the first element of a beam that is no ring
-    pub is_first: bool,
+    pub(super) is_first: bool,
     /// True if ends of the beam are half spheres, false if they do not touch
-    pub has_caps: bool,
+    pub(super) has_caps: bool,
 }
 
 /// A point of a pair of elements that may touch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PairCandidate {
     /// Places on the first and on the second element, from 0 to 1
-    pub at: [f64; 2],
+    pub(super) at: [f64; 2],
     /// True for the places that are closest points and move; others stay
-    pub free: [bool; 2],
+    pub(super) free: [bool; 2],
     /// Its kind
-    pub kind: PairPointKind,
+    pub(super) kind: PairPointKind,
     /// The part of the force that it carries
-    pub weight: f64,
+    pub(super) weight: f64,
 }
 
 /// The point of an element that is closest to a node of the other beam.

@@ -21,20 +21,20 @@ const SAME_PLACE: f64 = 0.9;
 /// A contact point of two beams in a state.
 pub(super) struct PairPoint<'a> {
     /// Number of the pair in the list
-    pub number: usize,
-    pub pair: ListedPair,
-    pub candidate: PairCandidate,
+    pub(super) number: usize,
+    pub(super) pair: ListedPair,
+    pub(super) candidate: PairCandidate,
     /// Number of the point that it was, and its memory
-    pub partner: Option<(usize, &'a PairPointMemory)>,
-    pub law: PairLaw,
+    pub(super) partner: Option<(usize, &'a PairPointMemory)>,
+    pub(super) law: PairLaw,
     /// Normal and traction in the axes of the carrier
-    pub state: PointState,
+    pub(super) state: PointState,
     /// The rotation of the carrier
     pub carrier: Mat3,
     /// The place on the centre line of the first beam
-    pub place: Vec3,
+    place: Vec3,
     /// The number of nodes to both sides, and their shape functions
-    pub shapes: [[f64; 4]; 2],
+    pub(super) shapes: [[f64; 4]; 2],
 }
 
 impl PairPoint<'_> {
@@ -65,11 +65,11 @@ struct Part<'a> {
 
 /// A look at listed pairs in a state.
 pub(super) struct PairsNow<'a> {
-    pub pairs: &'a BeamPairs,
-    pub laws: &'a [ContactLaws],
-    pub at: &'a State,
+    pub(super) pairs: &'a BeamPairs,
+    laws: &'a [ContactLaws],
+    pub(super) at: &'a State,
     /// The list, which is that of the state but in an assembly of another one
-    pub list: &'a [ListedPair],
+    pub(super) list: &'a [ListedPair],
     places: Vec<Vec3>,
     /// The part of the force of each pair of the list that closest points carry
     blend: Cow<'a, [f64]>,

@@ -14,8 +14,8 @@ use std::sync::Arc;
 /// Pairs of beams with the laws of their contacts.
 #[derive(Clone, Copy)]
 pub(in crate::effect::contact) struct PairRole<'a> {
-    pub pairs: &'a BeamPairs,
-    pub laws: &'a [ContactLaws],
+    pub(crate) pairs: &'a BeamPairs,
+    pub(crate) laws: &'a [ContactLaws],
 }
 
 impl<'a> PairRole<'a> {
