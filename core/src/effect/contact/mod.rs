@@ -42,7 +42,7 @@ use std::sync::Arc;
 /// Factor of the first stiffness of points that are held in modal stages: about that of elements.
 const HELD: f64 = 1e4;
 
-/// The shortest step on a way that is looked at, over the depth that is looked for.
+/// The shortest step on a way that is looked at, over the radius of the sphere that goes it.
 const SHORTEST_LOOK: f64 = 0.1;
 
 /// All contacts with rigid surfaces, and of beams with each other.
@@ -248,19 +248,22 @@ impl SurfaceContacts {
     }
 }
 
-/// True if the straight way between two places, in the axes of a surface, goes deeper into it than
-/// `limit`: whoever is out again at the end of the way may have come out on another side. Steps are
-/// as long as the distance is from the limit, which it cannot pass in a shorter one.
-fn goes_deeper(surface: &Surface, from: Vec3, to: Vec3, limit: f64) -> bool {
+/// True if a sphere that goes the straight way between two places, in the axes of a surface, is
+/// deeper in it on the way than at both ends by half of its radius: whoever is out again at the end
+/// may have come out on another side. Steps are as long as the distance is from that depth, which
+/// cannot be reached in a shorter one.
+fn goes_deeper(surface: &Surface, from: Vec3, to: Vec3, radius: f64) -> bool {
+    let [Ok(first), Ok(last)] = [from, to].map(|place| surface.distance(place)) else { return false };
+    let least = first.value.min(last.value).min(radius) - 0.5 * radius;
     let way = to - from;
     let length = way.norm();
     let mut done = 0.0;
     while done < length {
         let Ok(here) = surface.distance(from + way * (done / length)) else { return false };
-        if here.value < -limit {
+        if here.value < least {
             return true;
         }
-        done += (here.value + limit).max(SHORTEST_LOOK * limit);
+        done += (here.value - least).max(SHORTEST_LOOK * radius);
     }
     false
 }
@@ -720,7 +723,7 @@ impl Contacts for SurfaceContacts {
                 if moved <= limit {
                     continue;
                 }
-                if goes_deeper(&surface.surface, *before, *after, limit) {
+                if goes_deeper(&surface.surface, *before, *after, chain.radius) {
                     return Some(chain.nodes[k % chain.nodes.len()].node.u);
                 }
                 if moved <= depth {
