@@ -31,7 +31,7 @@ planar = {planar}
 
 {scene}"""
 
-ROLL_UP = """\
+CANTILEVER = """\
 [point]
 root = [0, 0, 0]
 tip = [{length!r}, 0, 0]
@@ -40,6 +40,9 @@ tip = [{length!r}, 0, 0]
 at = "root"
 fix = "all"
 
+"""
+
+ROLL_UP = CANTILEVER + """\
 [[load]]
 at = "tip"
 moment = [0, 0, {moment!r}]
@@ -97,15 +100,7 @@ values = [0, 1, 0]
 """
 
 
-FLOOR = """\
-[point]
-root = [0, 0, 0]
-tip = [{length!r}, 0, 0]
-
-[[support]]
-at = "root"
-fix = "all"
-
+FLOOR = CANTILEVER + """\
 [[load]]
 along = "b"
 force = [0, 0, {weight!r}]
