@@ -686,7 +686,7 @@ columns = ["reaction", "contact"]
 /// and go.
 #[test]
 fn sliding_goes_on_from_element_to_element() {
-    let surfaces = ["kind = \"cylinder\"\nfrom = [0, -1, 0]\nto = [0, 1, 0]", "kind = \"sphere\"\ncentre = [0, 0, 0]"];
+    let surfaces = ["kind = \"cylinder\"\nfrom = [0, -1, 0]\nto = [0, 1, 0]", "kind = \"sphere\"\nat = [0, 0, 0]"];
     let mut random = Random::new(31);
     for case in 0..18 {
         let order = 1 + case % 3;
