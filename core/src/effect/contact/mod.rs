@@ -5,8 +5,10 @@
 //! state is accepted.
 
 mod chain;
+mod chain_now;
 mod laws;
 mod pairs;
+mod passing;
 mod predecessors;
 mod resultant;
 mod shown;
@@ -24,28 +26,20 @@ use super::{
     ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, ElasticStick, MissedPairs,
     Penetration, Roles, TangentForm,
 };
-use crate::kernel::contact::{
-    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Status, Surface,
-    add_point,
-};
-use crate::kernel::{ElementSystem, Weights};
-use crate::rotation::Rotation;
+use crate::kernel::Weights;
+use crate::kernel::contact::Status;
 use crate::system::{
     Assembler, Category, ChainMemory, Connectivity, ContactRegime, ListedPair, Memory, MirrorData, PointMemory, Slot,
     State,
 };
-use crate::tensor::{Mat3, Vec3};
-use chain::{Candidate, shape};
-use laws::{RELEVANT_FORCE, ROUNDED, TOUCHING};
+use crate::tensor::Vec3;
+use chain_now::{ChainNow, before_of};
+use laws::{RELEVANT_FORCE, ROUNDED};
 use pairs::PairRole;
-use predecessors::Predecessors;
 use std::sync::Arc;
 
 /// Factor of the first stiffness of points that are held in modal stages: about that of elements.
 const HELD: f64 = 1e4;
-
-/// The shortest step on a way that is looked at, over the radius of the sphere that goes it.
-const SHORTEST_LOOK: f64 = 0.1;
 
 /// All contacts with rigid surfaces, and of beams with each other.
 #[derive(Clone, Debug, Default)]
@@ -58,29 +52,6 @@ pub struct SurfaceContacts {
     pub chains: Vec<Chain>,
     /// Beams that may touch each other
     pub pairs: BeamPairs,
-}
-
-/// A chain in a state.
-struct ChainNow<'a> {
-    chain: &'a Chain,
-    laws: &'a ContactLaws,
-    surface: &'a SceneSurface,
-    carrier: Carrier,
-    memory: Option<&'a ChainMemory>,
-    at: &'a State,
-    candidates: Vec<Candidate>,
-    /// The points in memory that the candidates were
-    predecessors: Vec<Predecessors>,
-}
-
-/// A point in a state.
-struct PointNow<'a> {
-    candidate: &'a Candidate,
-    predecessors: &'a Predecessors,
-    /// The memory of the point that it was
-    partner: Option<&'a PointMemory>,
-    law: ContactLaw,
-    state: PointState,
 }
 
 impl SurfaceContacts {
@@ -275,214 +246,6 @@ impl SurfaceContacts {
             power += self.pairs().damping_power(at);
         }
         power
-    }
-}
-
-/// True if a sphere that goes the straight way between two places, in the axes of a surface, is
-/// deeper in it on the way than at both ends by half of its radius: whoever is out again at the end
-/// may have come out on another side. Steps are as long as the distance is from that depth, which
-/// cannot be reached in a shorter one.
-fn goes_deeper(surface: &Surface, from: Vec3, to: Vec3, radius: f64) -> bool {
-    let [Ok(first), Ok(last)] = [from, to].map(|place| surface.distance(place)) else { return false };
-    let least = first.value.min(last.value).min(radius) - 0.5 * radius;
-    let way = to - from;
-    let length = way.norm();
-    let mut done = 0.0;
-    while done < length {
-        let Ok(here) = surface.distance(from + way * (done / length)) else { return false };
-        if here.value < least {
-            return true;
-        }
-        done += (here.value - least).max(SHORTEST_LOOK * radius);
-    }
-    false
-}
-
-/// Places, followed by the middles between each two neighbours.
-fn with_middles(mut places: Vec<Vec3>) -> Vec<Vec3> {
-    let middles: Vec<Vec3> = places.windows(2).map(|pair| (pair[0] + pair[1]) * 0.5).collect();
-    places.extend(middles);
-    places
-}
-
-fn before_of(node: &ChainNode, carrier: &Carrier, at: &State) -> NodeBefore {
-    let place = node.place + at.q[node.node.u as usize];
-    NodeBefore::of(place, at.rotation(node.node.p).r, carrier.place, &carrier.rotation.r)
-}
-
-impl<'a> ChainNow<'a> {
-    /// Visits all candidates with their forces, and the system of the element of each.
-    fn each_point(&self, weights: Weights, visit: &mut dyn FnMut(&PointNow, &ElementSystem)) {
-        if self.candidates.is_empty() {
-            return;
-        }
-        let blocks = 2 * (self.chain.order + 1) + if self.carrier.is_node { 2 } else { 0 };
-        let mut system = ElementSystem::new(blocks);
-        for (candidate, predecessors) in self.candidates.iter().zip(&self.predecessors) {
-            let partner = predecessors.own.and_then(|number| self.memory?.points.get(number));
-            let law = self.law(candidate, predecessors, partner);
-            system.clear_for(weights);
-            let state = match self.chain.order {
-                0 => self.add::<1>(candidate, &law, weights, &mut system),
-                1 => self.add::<2>(candidate, &law, weights, &mut system),
-                2 => self.add::<3>(candidate, &law, weights, &mut system),
-                _ => self.add::<4>(candidate, &law, weights, &mut system),
-            };
-            let Some(state) = state else { continue };
-            visit(&PointNow { candidate, predecessors, partner, law, state }, &system);
-        }
-    }
-
-    /// Adds forces and tangent of a candidate; `None` where the surface has no normal.
-    fn add<const N: usize>(
-        &self,
-        candidate: &Candidate,
-        law: &ContactLaw,
-        weights: Weights,
-        out: &mut ElementSystem,
-    ) -> Option<PointState> {
-        let shape = shape::<N>(candidate);
-        let nodes = self.chain.nodes_of(candidate.element);
-        let first = candidate.element * self.chain.order;
-        let nodes: [ContactNode; N] = std::array::from_fn(|i| self.node(&nodes[i], first + i, law.friction.is_some()));
-        let place = (0..N).fold(Vec3::ZERO, |sum, i| sum + nodes[i].place * shape.values[i]);
-        let distance = candidate.distance(&self.surface.surface, self.carrier.on_surface(place))?;
-        Some(add_point(&nodes, &shape, &self.carrier, &distance, law, weights, out))
-    }
-
-    /// The points with a force, for memory. Points that an augmentation finds open keep the traction of
-    /// the last converged state, which returns with the contact.
-    fn points(&self, accepts: bool) -> Vec<PointMemory> {
-        let known = self.memory.map_or(&[][..], |memory| &memory.points);
-        let mut goes_on = vec![accepts; known.len()];
-        let mut points = Vec::new();
-        self.each_point(Weights::NONE, &mut |point, _| {
-            if point.state.normal_force.force > 0.0 {
-                points.push(self.memory_of(point, accepts));
-                point.predecessors.all().for_each(|number| goes_on[number] = true);
-            }
-        });
-        let opened =
-            known.iter().zip(&goes_on).filter(|(_, goes_on)| !**goes_on).filter_map(|(point, _)| point.opened());
-        points.extend(opened);
-        points.sort_by(|a, b| a.place.total_cmp(&b.place));
-        points
-    }
-
-    fn node(&self, node: &ChainNode, number: usize, rubs: bool) -> ContactNode {
-        let place = node.place + self.at.q[node.node.u as usize];
-        let velocity = self.at.v[node.node.u as usize];
-        if !rubs {
-            let before = NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY };
-            return ContactNode { place, velocity, rotation: Rotation::new(Vec3::ZERO), before };
-        }
-        let known = self.memory.and_then(|memory| memory.nodes.get(number));
-        let before = known.copied().unwrap_or_else(|| self.initial(node));
-        ContactNode { place, velocity, rotation: self.at.rotation(node.node.p), before }
-    }
-
-    /// A node as the surface saw it at the start of the run.
-    fn initial(&self, node: &ChainNode) -> NodeBefore {
-        let carrier = match self.surface.carrier {
-            SurfaceCarrier::Node { place, .. } | SurfaceCarrier::Turn { about: place, .. } => place,
-            SurfaceCarrier::Ground | SurfaceCarrier::Shift { .. } => Vec3::ZERO,
-        };
-        NodeBefore { place: node.place - carrier, rotation: Mat3::IDENTITY }
-    }
-
-    fn law(&self, candidate: &Candidate, predecessors: &Predecessors, partner: Option<&PointMemory>) -> ContactLaw {
-        let contacts = &self.at.contacts;
-        let stiffness = self.chain.stiffness[candidate.element];
-        let first = stiffness.first(contacts.regime);
-        let normal = match contacts.regime {
-            ContactRegime::Augmented => NormalLaw::Augmented {
-                multiplier: partner.map_or(0.0, |point| point.multiplier),
-                stiffness: first * contacts.factor,
-                touching: TOUCHING * self.laws.penetration,
-            },
-            ContactRegime::Penalty => NormalLaw::Penalty { stiffness: first, damping: self.laws.damping, toe: 0.0 },
-        };
-        let coefficient = self.laws.friction_at(self.chain.fraction(candidate));
-        let friction = (coefficient > 0.0).then_some(FrictionLaw { coefficient, stiffness: self.laws.stick * first });
-        let points = self.memory.map_or(&[][..], |memory| &memory.points);
-        let carried = predecessors.traction(1.0, &|number| (&points[number], 1.0));
-        let carried = CarriedTraction { goes_on: contacts.goes_on, ..carried };
-        let is_penalty = contacts.regime == ContactRegime::Penalty;
-        let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.offset);
-        ContactLaw { radius: self.chain.radius + offset, normal, friction, carried, place: candidate.place }
-    }
-
-    /// The memory of a point with a force. Before a state is accepted, traction and normal remain
-    /// those of the last one.
-    fn memory_of(&self, point: &PointNow, accepts: bool) -> PointMemory {
-        let PointNow { candidate, state, law, .. } = point;
-        let rotation = &self.carrier.rotation.r;
-        let carried = if accepts { self.laws.carried(law.friction.as_ref(), state) } else { law.carried };
-        let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
-        let gap = state.gap + law.radius - self.chain.radius;
-        let force = state.normal_force.force;
-        // The next level begins with the first stiffness.
-        let first = self.chain.stiffness[candidate.element].augmented * self.at.contacts.first_factor;
-        let multiplier = if accepts { force + first * gap } else { force };
-        let is_penalty = self.at.contacts.regime == ContactRegime::Penalty;
-        let before = point.partner.filter(|_| is_penalty);
-        PointMemory {
-            place: candidate.along(),
-            edge: candidate.edge,
-            force,
-            multiplier,
-            gap,
-            traction: carried.force,
-            normal: carried.normal,
-            onward: carried.onward,
-            offset: before.map_or(0.0, |before| before.offset),
-            steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
-            push: *rotation * state.force(),
-            at: contact,
-        }
-    }
-
-    /// The place of a candidate (global components).
-    fn place(&self, candidate: &Candidate) -> Vec3 {
-        let nodes = self.chain.nodes_of(candidate.element);
-        let places: Vec<Vec3> = nodes.iter().map(|node| node.place + self.at.q[node.node.u as usize]).collect();
-        match &places[..] {
-            [a] => *a,
-            [a, b] => sum(&shape::<2>(candidate).values, &[*a, *b]),
-            [a, b, c] => sum(&shape::<3>(candidate).values, &[*a, *b, *c]),
-            [a, b, c, d, ..] => sum(&shape::<4>(candidate).values, &[*a, *b, *c, *d]),
-            [] => Vec3::ZERO,
-        }
-    }
-
-    /// Energy per time that the damping of a point takes: p_el c (dg/dt)^2.
-    fn damping_power(&self, point: &PointNow) -> f64 {
-        let NormalLaw::Penalty { stiffness, damping, .. } = point.law.normal else { return 0.0 };
-        let elastic = stiffness * (-point.state.gap).max(0.0);
-        let force = point.state.normal_force.force;
-        if elastic == 0.0 || damping == 0.0 {
-            return 0.0;
-        }
-        // force = elastic (1 - c rate) where it is positive.
-        let rate = (1.0 - force / elastic) / damping;
-        (elastic - force) * rate
-    }
-
-    fn slot_of(&self, candidate: &Candidate) -> Slot {
-        let nodes = self.chain.nodes_of(candidate.element);
-        let nearest = (candidate.s * self.chain.order as f64).round() as usize;
-        nodes[nearest.min(nodes.len() - 1)].node.u
-    }
-}
-
-fn sum<const N: usize>(factors: &[f64; N], places: &[Vec3; N]) -> Vec3 {
-    factors.iter().zip(places).fold(Vec3::ZERO, |sum, (factor, place)| sum + *place * *factor)
-}
-
-impl PointNow<'_> {
-    /// The work of friction since the last converged state.
-    fn friction_work(&self) -> f64 {
-        self.state.traction.work(&self.law.carried, self.state.normal, self.predecessors.is_new())
     }
 }
 
@@ -739,35 +502,10 @@ impl Contacts for SurfaceContacts {
     }
 
     fn passed(&self, from: &State, to: &State) -> Option<Slot> {
-        for (chain, _, surface) in self.acting(to) {
-            let depth = surface.depth();
-            if depth == f64::INFINITY {
-                continue;
-            }
-            let [before, after] =
-                [from, to].map(|at| with_middles(chain.seen(&surface.carrier(at, Weights::NONE), at)));
-            for (k, (before, after)) in before.iter().zip(&after).enumerate() {
-                let moved = (*after - *before).norm();
-                let limit = chain.radius.min(depth);
-                if moved <= limit {
-                    continue;
-                }
-                if goes_deeper(&surface.surface, *before, *after, chain.radius) {
-                    return Some(chain.nodes[k % chain.nodes.len()].node.u);
-                }
-                if moved <= depth {
-                    continue;
-                }
-                let [from, to] = [before, after].map(|place| surface.surface.distance(*place).ok());
-                let reach = from.map_or(0.0, |from| from.value + depth);
-                // Along a surface nodes may go farther; on its other side the normal is turned over.
-                let has_turned = from.zip(to).is_none_or(|(from, to)| from.normal.dot(to.normal) < 0.0);
-                if moved > reach && has_turned {
-                    return Some(chain.nodes[k % chain.nodes.len()].node.u);
-                }
-            }
-        }
-        self.turned_over(to).or_else(|| self.pairs().passed(from, to))
+        let of_chain = |(chain, _, surface): (&Chain, &ContactLaws, &SceneSurface)| {
+            passing::passed(chain, surface, from, to).map(|node| chain.nodes[node].node.u)
+        };
+        self.acting(to).find_map(of_chain).or_else(|| self.turned_over(to)).or_else(|| self.pairs().passed(from, to))
     }
 
     fn energy(&self, at: &State) -> f64 {

@@ -1,0 +1,219 @@
+//! A beam or a body against one surface in a state: its contact points with their forces.
+
+use super::chain::{Candidate, Chain, shape};
+use super::laws::{ContactLaws, TOUCHING};
+use super::predecessors::Predecessors;
+use super::strand::ChainNode;
+use super::surface::{SceneSurface, SurfaceCarrier};
+use crate::kernel::contact::{
+    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, add_point,
+};
+use crate::kernel::{ElementSystem, Weights};
+use crate::rotation::Rotation;
+use crate::system::{ChainMemory, ContactRegime, PointMemory, Slot, State};
+use crate::tensor::{Mat3, Vec3};
+
+/// A chain in a state.
+pub(super) struct ChainNow<'a> {
+    pub(super) chain: &'a Chain,
+    pub(super) laws: &'a ContactLaws,
+    pub(super) surface: &'a SceneSurface,
+    pub(super) carrier: Carrier,
+    pub(super) memory: Option<&'a ChainMemory>,
+    pub(super) at: &'a State,
+    pub(super) candidates: Vec<Candidate>,
+    /// The points in memory that the candidates were
+    pub(super) predecessors: Vec<Predecessors>,
+}
+
+/// A point in a state.
+pub(super) struct PointNow<'a> {
+    pub(super) candidate: &'a Candidate,
+    pub(super) predecessors: &'a Predecessors,
+    /// The memory of the point that it was
+    pub(super) partner: Option<&'a PointMemory>,
+    pub(super) law: ContactLaw,
+    pub(super) state: PointState,
+}
+
+/// A node as its surface sees it in a state, for the memory.
+pub(super) fn before_of(node: &ChainNode, carrier: &Carrier, at: &State) -> NodeBefore {
+    let place = node.place + at.q[node.node.u as usize];
+    NodeBefore::of(place, at.rotation(node.node.p).r, carrier.place, &carrier.rotation.r)
+}
+
+impl<'a> ChainNow<'a> {
+    /// Visits all candidates with their forces, and the system of the element of each.
+    pub(super) fn each_point(&self, weights: Weights, visit: &mut dyn FnMut(&PointNow, &ElementSystem)) {
+        if self.candidates.is_empty() {
+            return;
+        }
+        let blocks = 2 * (self.chain.order + 1) + if self.carrier.is_node { 2 } else { 0 };
+        let mut system = ElementSystem::new(blocks);
+        for (candidate, predecessors) in self.candidates.iter().zip(&self.predecessors) {
+            let partner = predecessors.own.and_then(|number| self.memory?.points.get(number));
+            let law = self.law(candidate, predecessors, partner);
+            system.clear_for(weights);
+            let state = match self.chain.order {
+                0 => self.add::<1>(candidate, &law, weights, &mut system),
+                1 => self.add::<2>(candidate, &law, weights, &mut system),
+                2 => self.add::<3>(candidate, &law, weights, &mut system),
+                _ => self.add::<4>(candidate, &law, weights, &mut system),
+            };
+            let Some(state) = state else { continue };
+            visit(&PointNow { candidate, predecessors, partner, law, state }, &system);
+        }
+    }
+
+    /// Adds forces and tangent of a candidate; `None` where the surface has no normal.
+    fn add<const N: usize>(
+        &self,
+        candidate: &Candidate,
+        law: &ContactLaw,
+        weights: Weights,
+        out: &mut ElementSystem,
+    ) -> Option<PointState> {
+        let shape = shape::<N>(candidate);
+        let nodes = self.chain.nodes_of(candidate.element);
+        let first = candidate.element * self.chain.order;
+        let nodes: [ContactNode; N] = std::array::from_fn(|i| self.node(&nodes[i], first + i, law.friction.is_some()));
+        let place = (0..N).fold(Vec3::ZERO, |sum, i| sum + nodes[i].place * shape.values[i]);
+        let distance = candidate.distance(&self.surface.surface, self.carrier.on_surface(place))?;
+        Some(add_point(&nodes, &shape, &self.carrier, &distance, law, weights, out))
+    }
+
+    /// The points with a force, for memory. Points that an augmentation finds open keep the traction of
+    /// the last converged state, which returns with the contact.
+    pub(super) fn points(&self, accepts: bool) -> Vec<PointMemory> {
+        let known = self.memory.map_or(&[][..], |memory| &memory.points);
+        let mut goes_on = vec![accepts; known.len()];
+        let mut points = Vec::new();
+        self.each_point(Weights::NONE, &mut |point, _| {
+            if point.state.normal_force.force > 0.0 {
+                points.push(self.memory_of(point, accepts));
+                point.predecessors.all().for_each(|number| goes_on[number] = true);
+            }
+        });
+        let opened =
+            known.iter().zip(&goes_on).filter(|(_, goes_on)| !**goes_on).filter_map(|(point, _)| point.opened());
+        points.extend(opened);
+        points.sort_by(|a, b| a.place.total_cmp(&b.place));
+        points
+    }
+
+    fn node(&self, node: &ChainNode, number: usize, rubs: bool) -> ContactNode {
+        let place = node.place + self.at.q[node.node.u as usize];
+        let velocity = self.at.v[node.node.u as usize];
+        if !rubs {
+            let before = NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY };
+            return ContactNode { place, velocity, rotation: Rotation::new(Vec3::ZERO), before };
+        }
+        let known = self.memory.and_then(|memory| memory.nodes.get(number));
+        let before = known.copied().unwrap_or_else(|| self.initial(node));
+        ContactNode { place, velocity, rotation: self.at.rotation(node.node.p), before }
+    }
+
+    /// A node as the surface saw it at the start of the run.
+    fn initial(&self, node: &ChainNode) -> NodeBefore {
+        let carrier = match self.surface.carrier {
+            SurfaceCarrier::Node { place, .. } | SurfaceCarrier::Turn { about: place, .. } => place,
+            SurfaceCarrier::Ground | SurfaceCarrier::Shift { .. } => Vec3::ZERO,
+        };
+        NodeBefore { place: node.place - carrier, rotation: Mat3::IDENTITY }
+    }
+
+    fn law(&self, candidate: &Candidate, predecessors: &Predecessors, partner: Option<&PointMemory>) -> ContactLaw {
+        let contacts = &self.at.contacts;
+        let stiffness = self.chain.stiffness[candidate.element];
+        let first = stiffness.first(contacts.regime);
+        let normal = match contacts.regime {
+            ContactRegime::Augmented => NormalLaw::Augmented {
+                multiplier: partner.map_or(0.0, |point| point.multiplier),
+                stiffness: first * contacts.factor,
+                touching: TOUCHING * self.laws.penetration,
+            },
+            ContactRegime::Penalty => NormalLaw::Penalty { stiffness: first, damping: self.laws.damping, toe: 0.0 },
+        };
+        let coefficient = self.laws.friction_at(self.chain.fraction(candidate));
+        let friction = (coefficient > 0.0).then_some(FrictionLaw { coefficient, stiffness: self.laws.stick * first });
+        let points = self.memory.map_or(&[][..], |memory| &memory.points);
+        let carried = predecessors.traction(1.0, &|number| (&points[number], 1.0));
+        let carried = CarriedTraction { goes_on: contacts.goes_on, ..carried };
+        let is_penalty = contacts.regime == ContactRegime::Penalty;
+        let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.offset);
+        ContactLaw { radius: self.chain.radius + offset, normal, friction, carried, place: candidate.place }
+    }
+
+    /// The memory of a point with a force. Before a state is accepted, traction and normal remain
+    /// those of the last one.
+    fn memory_of(&self, point: &PointNow, accepts: bool) -> PointMemory {
+        let PointNow { candidate, state, law, .. } = point;
+        let rotation = &self.carrier.rotation.r;
+        let carried = if accepts { self.laws.carried(law.friction.as_ref(), state) } else { law.carried };
+        let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
+        let gap = state.gap + law.radius - self.chain.radius;
+        let force = state.normal_force.force;
+        // The next level begins with the first stiffness.
+        let first = self.chain.stiffness[candidate.element].augmented * self.at.contacts.first_factor;
+        let multiplier = if accepts { force + first * gap } else { force };
+        let is_penalty = self.at.contacts.regime == ContactRegime::Penalty;
+        let before = point.partner.filter(|_| is_penalty);
+        PointMemory {
+            place: candidate.along(),
+            edge: candidate.edge,
+            force,
+            multiplier,
+            gap,
+            traction: carried.force,
+            normal: carried.normal,
+            onward: carried.onward,
+            offset: before.map_or(0.0, |before| before.offset),
+            steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
+            push: *rotation * state.force(),
+            at: contact,
+        }
+    }
+
+    /// The place of a candidate (global components).
+    fn place(&self, candidate: &Candidate) -> Vec3 {
+        let nodes = self.chain.nodes_of(candidate.element);
+        let places: Vec<Vec3> = nodes.iter().map(|node| node.place + self.at.q[node.node.u as usize]).collect();
+        match &places[..] {
+            [a] => *a,
+            [a, b] => sum(&shape::<2>(candidate).values, &[*a, *b]),
+            [a, b, c] => sum(&shape::<3>(candidate).values, &[*a, *b, *c]),
+            [a, b, c, d, ..] => sum(&shape::<4>(candidate).values, &[*a, *b, *c, *d]),
+            [] => Vec3::ZERO,
+        }
+    }
+
+    /// Energy per time that the damping of a point takes: p_el c (dg/dt)^2.
+    pub(super) fn damping_power(&self, point: &PointNow) -> f64 {
+        let NormalLaw::Penalty { stiffness, damping, .. } = point.law.normal else { return 0.0 };
+        let elastic = stiffness * (-point.state.gap).max(0.0);
+        let force = point.state.normal_force.force;
+        if elastic == 0.0 || damping == 0.0 {
+            return 0.0;
+        }
+        // force = elastic (1 - c rate) where it is positive.
+        let rate = (1.0 - force / elastic) / damping;
+        (elastic - force) * rate
+    }
+
+    pub(super) fn slot_of(&self, candidate: &Candidate) -> Slot {
+        let nodes = self.chain.nodes_of(candidate.element);
+        let nearest = (candidate.s * self.chain.order as f64).round() as usize;
+        nodes[nearest.min(nodes.len() - 1)].node.u
+    }
+}
+
+fn sum<const N: usize>(factors: &[f64; N], places: &[Vec3; N]) -> Vec3 {
+    factors.iter().zip(places).fold(Vec3::ZERO, |sum, (factor, place)| sum + *place * *factor)
+}
+
+impl PointNow<'_> {
+    /// The work of friction since the last converged state.
+    pub(super) fn friction_work(&self) -> f64 {
+        self.state.traction.work(&self.law.carried, self.state.normal, self.predecessors.is_new())
+    }
+}
