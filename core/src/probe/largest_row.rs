@@ -108,6 +108,9 @@ impl Extreme {
 }
 
 impl LargestRow {
+    /// Bytes that rows take while they wait, at most.
+    pub const WAITING_BYTES: usize = BATCH * size_of::<Waiting>();
+
     /// Takes the next row.
     pub fn row(&mut self, section: &PlacedRecovery, criterion: Criterion, row: Row) {
         let search = Search { section, criterion };

@@ -15,7 +15,7 @@ pub use columns::{
 };
 pub use envelope::{Envelope, Extremes, Followed};
 pub use figure::{Figure, Line, LinePoint, Look};
-pub use largest_row::Extreme;
+pub use largest_row::{Extreme, LargestRow};
 pub use place::{BeamPoint, Place, StressPlace, StressPoint};
 pub use profile::{Profile, ProfilePlace, StageEnd};
 pub use reading::{Probe, Reading};

@@ -260,7 +260,7 @@ impl Recovery {
     /// Of a computed section. `laws` are those of the materials, by their index.
     pub fn computed(
         name: &str,
-        StressField { mesh, nodal: stresses }: &StressField,
+        StressField { mesh, nodal: stresses, .. }: &StressField,
         placement: Placement,
         corners: Corners,
         laws: &[Option<FailureLaw>],
