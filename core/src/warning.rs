@@ -135,6 +135,8 @@ warning_kinds! {
     ContactPenetration: "contact_penetration", Time;
     /// Elements penetrate a surface between the points that carry contact forces.
     HiddenPenetration: "hidden_penetration", Mesh;
+    /// Friction holds by springs that have given way far.
+    SoftStick: "soft_stick", Deck;
     /// A contact of a dynamic stage lasted few steps.
     ShortContact: "short_contact", Time;
     /// Two points at one place are not joined.

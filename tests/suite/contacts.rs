@@ -619,3 +619,84 @@ columns = ["u", "contact"]
         assert!((moved + 0.05).abs() < 1e-3 && (force - 2.95).abs() < 1e-2, "{place:?}: {moved} {force}");
     }
 }
+
+/// A beam that is bent over a round surface by its ends and then dragged along itself.
+fn dragged(elements: usize, order: usize, surface: &str, shift: f64, friction: f64) -> String {
+    format!(
+        r#"
+[point]
+a = ["-1.5 + {shift}", 0, 0.5501]
+b = ["1.5 + {shift}", 0, 0.5501]
+[section.s]
+EA = 1e5
+GA = 4e4
+GJ = 10
+EI = 10
+[[beam]]
+name = "w"
+section = "s"
+through = ["a", "b"]
+elements = {elements}
+order = {order}
+[[support]]
+at = "a"
+fix = ["uy", "rx", "rz"]
+[[support]]
+at = "b"
+fix = ["uy"]
+[[support]]
+at = "a"
+fix = ["ux"]
+stages = [1]
+[[motion]]
+at = "a"
+uz = -0.3
+[[motion]]
+at = "b"
+uz = -0.3
+[[motion]]
+at = "a"
+ux = 0.3
+stages = [2]
+[[surface]]
+name = "round"
+{surface}
+radius = 0.5
+[[contact]]
+name = "c"
+beams = ["w"]
+surfaces = ["round"]
+radius = 0.05
+friction = {friction}
+stick = 10
+[[stage]]
+kind = "static"
+steps = 6
+[[stage]]
+kind = "static"
+steps = 60
+[output]
+nodes = ["a"]
+columns = ["reaction", "contact"]
+"#
+    )
+}
+
+/// A beam that slides keeps the friction mu N where its contact passes to the next element, and where points come
+/// and go.
+#[test]
+fn sliding_goes_on_from_element_to_element() {
+    let surfaces = ["kind = \"cylinder\"\nfrom = [0, -1, 0]\nto = [0, 1, 0]", "kind = \"sphere\"\ncentre = [0, 0, 0]"];
+    let mut random = Random::new(31);
+    for case in 0..18 {
+        let order = 1 + case % 3;
+        let elements = 8 + (random.range(0.0, 25.0) as usize) / order;
+        let (surface, shift, friction) = (surfaces[case / 3 % 2], random.range(0.0, 0.3), random.range(0.1, 0.6));
+        let simulation = simulate(&dragged(elements, order, surface, shift, friction));
+        let [normal, force] = ["c.normal", "c.friction"].map(|name| simulation.column(name));
+        // It slides after a third of the way.
+        let parts = normal.iter().zip(&force).skip(27).map(|(normal, force)| force / (friction * normal));
+        let least = parts.fold(f64::INFINITY, f64::min);
+        assert!(least > 0.999, "case {case}: {elements} elements of order {order}, {surface}: {least}");
+    }
+}

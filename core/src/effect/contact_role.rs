@@ -48,6 +48,10 @@ pub trait Contacts {
     /// The energy stored in an accepted state: of penalties and of elastic stick.
     fn energy(&self, at: &State) -> f64;
 
+    /// The point that sticks by the longest way of its spring, over its radius, in an accepted state;
+    /// `None` where nothing sticks.
+    fn softest_stick(&self, at: &State) -> Option<ElasticStick>;
+
     /// The forces of a contact, by its number, in an accepted state.
     fn resultant(&self, number: usize, at: &State) -> ContactResultant;
 
@@ -103,6 +107,28 @@ pub struct Penetration {
     pub(crate) slot: Slot,
     /// Its depth, a length
     pub(crate) depth: f64,
+}
+
+/// A point that sticks by a spring.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ElasticStick {
+    /// Name of the contact
+    pub(crate) contact: String,
+    /// The way that the spring has given, a length
+    pub(crate) way: f64,
+    /// The radius of the beam or body
+    pub(crate) radius: f64,
+}
+
+impl ElasticStick {
+    /// The softer one of two.
+    pub fn softer(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+        let share = |stick: &Self| stick.way / stick.radius;
+        match (a, b) {
+            (Some(a), Some(b)) => Some(if share(&b) > share(&a) { b } else { a }),
+            (a, b) => a.or(b),
+        }
+    }
 }
 
 /// Forces and gaps of one contact.

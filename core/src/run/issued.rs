@@ -16,6 +16,8 @@ pub(super) struct IssuedWarnings {
     /// warning.
     pub(super) frame: f64,
     pub(super) soft: bool,
+    /// That friction is held by a soft spring
+    pub(super) soft_stick: bool,
     pub(super) axis: bool,
     pub(super) subdivision: bool,
     /// How far a node has gone in a dynamic stage of fixed steps
@@ -34,6 +36,7 @@ impl Default for IssuedWarnings {
             uncertainty: 1e-7,
             frame: 1e-2,
             soft: false,
+            soft_stick: false,
             axis: false,
             subdivision: false,
             moved: 0.0,

@@ -4,7 +4,7 @@ use super::energy::is_unbalanced;
 use super::failure::Moment;
 use super::findings::Warning;
 use super::stage_run::StageRun;
-use crate::effect::Penetration;
+use crate::effect::{ElasticStick, Penetration};
 use crate::interrupt;
 use crate::kernel::Weights;
 use crate::model::charts;
@@ -18,6 +18,9 @@ const FRAME_ERROR: f64 = 0.0533;
 
 /// The tolerance, relative, of a balance that a stage before has found.
 const LOOSE_BALANCE: f64 = 1e-5;
+
+/// The way that friction may give, over the radius.
+const MOST_GIVEN: f64 = 0.2;
 
 impl StageRun<'_> {
     /// Warns of something at the present moment.
@@ -92,6 +95,23 @@ impl StageRun<'_> {
              between the points that carry forces: use more elements there"
         );
         self.warn(WarningKind::HiddenPenetration, message);
+    }
+
+    /// Friction builds up over the way that its springs give.
+    pub fn warn_of_soft_stick(&mut self) {
+        let Some(contacts) = self.model.contacts() else { return };
+        let Some(ElasticStick { contact, way, radius }) = contacts.softest_stick(self.state) else { return };
+        let share = way / radius;
+        if share <= MOST_GIVEN || std::mem::replace(&mut self.issued.soft_stick, true) {
+            return;
+        }
+        let stage = self.number + 1;
+        let message = format!(
+            "stage {stage} ends with contact \"{contact}\" held by friction whose elastic part has given way by \
+             {way:.2e}, which is {share:.2} of the radius: friction builds up over about that way (give the contact a \
+             larger `stick`)"
+        );
+        self.warn(WarningKind::SoftStick, message);
     }
 
     /// A stage that ends at rest takes kinetic energy away from what moved before.

@@ -64,22 +64,25 @@ impl Default for ContactMemory {
 impl ContactMemory {
     /// True if some point has a force.
     pub fn touches(&self) -> bool {
-        !self.pairs.points.is_empty() || self.chains.iter().any(|chain| !chain.points.is_empty())
+        let has_force = |point: &PointMemory| point.force > 0.0;
+        let of_pairs = self.pairs.points.iter().any(|point| has_force(&point.point));
+        of_pairs || self.chains.iter().flat_map(|chain| &chain.points).any(has_force)
     }
 }
 
 /// Contacts of a beam or a body against a surface.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct ChainMemory {
-    /// Points with a force, in the order of their places
+    /// The points, in the order of their places
     pub(crate) points: Vec<PointMemory>,
     /// The nodes as the surface saw them at the last converged state; empty without friction, and
     /// before the first state
     pub(crate) nodes: Vec<NodeBefore>,
 }
 
-/// A contact point with a force.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+/// A contact point with a force, or with the traction of the last converged state where an augmentation
+/// has found it open.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct PointMemory {
     /// Its place: the number of its element plus the part of that element before it
     pub(crate) place: f64,
@@ -97,8 +100,9 @@ pub struct PointMemory {
     pub(crate) traction: Vec3,
     /// n0, the normal at the last converged state, in the same axes
     pub(crate) normal: Vec3,
-    /// True if it slid at the last converged state
-    pub(crate) slides: bool,
+    /// The direction of the traction at the last converged state if it slid, in the same axes; zero
+    /// otherwise
+    pub(crate) onward: Vec3,
     /// The gap at which the penalty begins, a length: a dynamic stage begins with the forces of the
     /// static one before
     pub(crate) offset: f64,
@@ -108,6 +112,18 @@ pub struct PointMemory {
     pub(crate) push: Vec3,
     /// The place where bodies touch (global components)
     pub(crate) at: Vec3,
+}
+
+impl PointMemory {
+    /// True if it has a traction and did not slide.
+    pub fn sticks(&self) -> bool {
+        self.traction != Vec3::ZERO && self.onward == Vec3::ZERO
+    }
+
+    /// A point that is open now, with the traction of the last converged state; `None` if it had none.
+    pub fn opened(&self) -> Option<Self> {
+        (self.traction != Vec3::ZERO).then_some(Self { force: 0.0, multiplier: 0.0, ..*self })
+    }
 }
 
 /// Pairs of beam elements near each other, and their contacts.

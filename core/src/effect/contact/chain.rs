@@ -6,6 +6,7 @@
 //! which the surface is farther than they reach have none: the distance changes by no more than a
 //! point moves.
 
+use super::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
 use super::strand::{ChainNode, Strand};
 use super::surface::SceneSurface;
 use crate::kernel::MAX_NODES;
@@ -16,9 +17,6 @@ use crate::kernel::contact::{
 use crate::system::{ChainMemory, PointMemory, State};
 use crate::tensor::Vec3;
 use std::ops::Deref;
-
-/// The largest distance, in elements, between the places of a contact in two states.
-pub(super) const LARGEST_SHIFT: f64 = 1.5;
 
 /// The farthest point of an element with equally spaced nodes from any centre, over the farthest
 /// node: the Lebesgue constants of one to four nodes.
@@ -154,40 +152,37 @@ impl Chain {
         gap > 0.0 && self.nodes.iter().all(|node| (place(node) - middle).squared() < reach * reach)
     }
 
-    /// The number of the last point in memory of each candidate: the nearest ones first, each once.
-    /// Both touch the same thing; what remains passes from edge to edge.
-    pub(super) fn matched(&self, candidates: &[Candidate], memory: Option<&ChainMemory>) -> Vec<Option<usize>> {
-        let mut partner = vec![None; candidates.len()];
-        let Some(memory) = memory else { return partner };
-        let mut pairs: Vec<(bool, f64, usize, usize)> = Vec::new();
+    /// The points in memory that each candidate was.
+    pub(super) fn predecessors(&self, candidates: &[Candidate], memory: Option<&ChainMemory>) -> Vec<Predecessors> {
+        let points = memory.map_or(&[][..], |memory| &memory.points);
+        let mut links = Vec::new();
         let mut first = 0;
         // A ring goes on at its start.
         let goes_round = self.is_closed();
-        for (k, candidate) in candidates.iter().enumerate() {
+        for (number, candidate) in candidates.iter().enumerate() {
             let along = candidate.along();
-            let points = &memory.points;
             while !goes_round && first < points.len() && points[first].place < along - LARGEST_SHIFT {
                 first += 1;
             }
             let may_be_near = |point: &&PointMemory| goes_round || point.place <= along + LARGEST_SHIFT;
-            for (j, point) in points[first..].iter().take_while(may_be_near).enumerate() {
+            for (own, point) in (first..).zip(points[first..].iter().take_while(may_be_near)) {
                 let shift = self.shift(point.place, along);
-                let is_other = point.edge != candidate.edge;
-                let may_pass = point.edge.is_some() && candidate.edge.is_some();
-                if shift <= LARGEST_SHIFT && (!is_other || may_pass) {
-                    pairs.push((is_other, shift, k, first + j));
+                if shift <= LARGEST_SHIFT {
+                    let relation = relation(point.edge, candidate.edge);
+                    links.push(Link { candidate: number, point: own, relation, shift });
                 }
             }
         }
-        pairs.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
-        let mut taken = vec![false; memory.points.len()];
-        for (_, _, k, j) in pairs {
-            if partner[k].is_none() && !taken[j] {
-                partner[k] = Some(j);
-                taken[j] = true;
-            }
-        }
-        partner
+        Predecessors::of(links, candidates.len(), points.len())
+    }
+}
+
+/// The relation of two points by the edges that they touch.
+fn relation(before: Option<u32>, now: Option<u32>) -> Relation {
+    match (before, now) {
+        (before, now) if before == now => Relation::Same,
+        (Some(_), Some(_)) => Relation::OtherEdge,
+        _ => Relation::OtherFeature,
     }
 }
 

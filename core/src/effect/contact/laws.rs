@@ -1,6 +1,7 @@
 //! The laws of a contact, and bounds that surfaces and pairs of beams share.
 
-use crate::kernel::contact::{CarriedTraction, FrictionLaw};
+use crate::kernel::contact::{CarriedTraction, FrictionLaw, PointState, Status};
+use crate::tensor::Vec3;
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
@@ -35,10 +36,16 @@ impl ContactLaws {
     /// The memory of friction at an accepted point. A point that barely touches has none: the
     /// direction of its traction is that of round-off. The bound follows the first stiffness, not
     /// that of the last augmentation, which a heavier contact may have raised.
-    pub(super) fn carried(&self, friction: Option<&FrictionLaw>, force: f64, now: CarriedTraction) -> CarriedTraction {
+    pub(super) fn carried(&self, friction: Option<&FrictionLaw>, state: &PointState) -> CarriedTraction {
+        let none = CarriedTraction { normal: state.normal, ..CarriedTraction::default() };
         let first_stiffness = friction.map_or(0.0, |friction| friction.stiffness / self.stick);
-        let barely = BARELY_TOUCHING * self.penetration * first_stiffness;
-        if force > barely { now } else { CarriedTraction { normal: now.normal, ..CarriedTraction::default() } }
+        if state.normal_force.force <= BARELY_TOUCHING * self.penetration * first_stiffness {
+            return none;
+        }
+        let force = state.traction.force;
+        let slides = state.status() == Status::Slides;
+        let onward = force.normalized().filter(|_| slides).unwrap_or(Vec3::ZERO);
+        CarriedTraction { force, onward, ..none }
     }
 
     /// The coefficient of friction at a part of the length of a beam.

@@ -7,6 +7,7 @@
 mod chain;
 mod laws;
 mod pairs;
+mod predecessors;
 mod resultant;
 mod shown;
 mod strand;
@@ -20,8 +21,8 @@ pub use strand::{ChainNode, ContactStiffness, Strand};
 pub use surface::{SceneSurface, SurfaceCarrier};
 
 use super::{
-    ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, MissedPairs, Penetration,
-    Roles, TangentForm,
+    ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, ElasticStick, MissedPairs,
+    Penetration, Roles, TangentForm,
 };
 use crate::kernel::contact::{
     CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, Status, Surface,
@@ -37,6 +38,7 @@ use crate::tensor::{Mat3, Vec3};
 use chain::{Candidate, shape};
 use laws::{RELEVANT_FORCE, ROUNDED, TOUCHING};
 use pairs::PairRole;
+use predecessors::Predecessors;
 use std::sync::Arc;
 
 /// Factor of the first stiffness of points that are held in modal stages: about that of elements.
@@ -67,15 +69,15 @@ struct ChainNow<'a> {
     memory: Option<&'a ChainMemory>,
     at: &'a State,
     candidates: Vec<Candidate>,
-    /// Numbers of the points in memory that the candidates were
-    partners: Vec<Option<usize>>,
+    /// The points in memory that the candidates were
+    predecessors: Vec<Predecessors>,
 }
 
 /// A point in a state.
 struct PointNow<'a> {
     candidate: &'a Candidate,
-    /// Number of the point that it was, and its memory
-    number: Option<usize>,
+    predecessors: &'a Predecessors,
+    /// The memory of the point that it was
     partner: Option<&'a PointMemory>,
     law: ContactLaw,
     state: PointState,
@@ -109,8 +111,8 @@ impl SurfaceContacts {
         let carrier = surface.carrier(at, weights);
         let memory = at.contacts.chains.get(number);
         let candidates = chain.candidates(&surface.surface, &carrier, memory, at);
-        let partners = chain.matched(&candidates, memory);
-        ChainNow { chain, laws: &self.laws[chain.contact], surface, carrier, memory, at, candidates, partners }
+        let predecessors = chain.predecessors(&candidates, memory);
+        ChainNow { chain, laws: &self.laws[chain.contact], surface, carrier, memory, at, candidates, predecessors }
     }
 
     /// The pairs of beams with the laws of their contacts.
@@ -131,33 +133,61 @@ impl SurfaceContacts {
         self.pairs.is_empty() && !at.contacts.touches() && self.chains.iter().all(is_clear)
     }
 
-    /// Writes a new memory of all chains.
-    fn remember(&self, at: &mut State, accepts: bool) -> f64 {
+    /// Writes a new memory of all contacts.
+    fn remember(&self, at: &mut State, accepts: bool) {
         let mut chains = vec![ChainMemory::default(); self.chains.len()];
-        let mut dissipated = 0.0;
         for (number, chain) in self.chains.iter().enumerate() {
-            let laws = &self.laws[chain.contact];
             let old = at.contacts.chains.get(number);
             let new = &mut chains[number];
-            if accepts && laws.rubs() {
+            if accepts && self.laws[chain.contact].rubs() {
                 let carrier = self.surfaces[chain.surface].carrier(at, Weights::NONE);
                 new.nodes = chain.nodes.iter().map(|node| before_of(node, &carrier, at)).collect();
             } else if let Some(old) = old {
                 new.nodes.clone_from(&old.nodes);
             }
-            if !self.is_near(number, at) {
-                continue;
+            if self.is_near(number, at) {
+                new.points = self.chain_now(number, at, Weights::NONE).points(accepts);
             }
-            let now = self.chain_now(number, at, Weights::NONE);
-            now.each_point(Weights::NONE, &mut |point, _| {
-                if point.state.normal_force.force > 0.0 {
-                    new.points.push(now.memory_of(point, accepts));
-                    dissipated += point.dissipated();
-                }
-            });
         }
         at.contacts.chains = Arc::new(chains);
-        dissipated + self.pairs().remember(at, accepts)
+        self.pairs().remember(at, accepts);
+    }
+
+    /// True if some contact has friction.
+    fn rubs(&self) -> bool {
+        self.laws.iter().any(ContactLaws::rubs)
+    }
+
+    /// The work of friction since the last converged state, which the memory of a state still tells;
+    /// negative where friction takes energy.
+    fn friction_work(&self, at: &State) -> f64 {
+        let mut work = 0.0;
+        if self.rubs() {
+            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+                chain.each_point(Weights::NONE, &mut |point, _| work += point.friction_work());
+            });
+            work += self.pairs().friction_work(at);
+        }
+        work
+    }
+
+    /// The energy of elastic stick of the points in memory.
+    fn stick_energy(&self, at: &State) -> f64 {
+        let mut energy = 0.0;
+        self.each_spring(at, &mut |_, point, stiffness| energy += point.traction.squared() / (2.0 * stiffness));
+        energy + self.pairs().stick_energy(at)
+    }
+
+    /// Shows the points in memory of chains with friction, with the stiffness K_t of stick.
+    fn each_spring(&self, at: &State, show: &mut dyn FnMut(&Chain, &PointMemory, f64)) {
+        for (chain, memory) in self.chains.iter().zip(&*at.contacts.chains) {
+            let laws = &self.laws[chain.contact];
+            let points = if laws.rubs() { &memory.points[..] } else { &[] };
+            for point in points {
+                let element = (point.place as usize).min(chain.elements() - 1);
+                show(chain, point, laws.stick * chain.stiffness[element].first(at.contacts.regime));
+            }
+        }
     }
 
     /// The length of beams with a force, or without one between points that have some, as where a
@@ -207,8 +237,8 @@ impl SurfaceContacts {
             chain.each_point(Weights::NONE, &mut |point, _| {
                 let offset = point.law.radius - chain.chain.radius;
                 deepest = deepest.max(-(point.state.gap + offset) / chain.laws.penetration);
-                if let (Some(number), true) = (point.number, point.state.normal_force.force > 0.0) {
-                    stays[number] = true;
+                if point.state.normal_force.force > 0.0 {
+                    point.predecessors.all().for_each(|number| stays[number] = true);
                 }
             });
             let points = chain.memory.map_or(&[][..], |memory| &memory.points);
@@ -224,7 +254,7 @@ impl SurfaceContacts {
     /// A node at a point with friction whose normal has turned over since the last converged state.
     fn turned_over(&self, at: &State) -> Option<Slot> {
         let mut turned = None;
-        if self.laws.iter().any(ContactLaws::rubs) {
+        if self.rubs() {
             self.each_chain(at, Weights::NONE, &mut |_, chain| {
                 chain.each_point(Weights::NONE, &mut |point, _| {
                     if point.state.traction.turned_over {
@@ -288,9 +318,9 @@ impl<'a> ChainNow<'a> {
         }
         let blocks = 2 * (self.chain.order + 1) + if self.carrier.is_node { 2 } else { 0 };
         let mut system = ElementSystem::new(blocks);
-        for (candidate, &number) in self.candidates.iter().zip(&self.partners) {
-            let partner = number.and_then(|number| self.memory?.points.get(number));
-            let law = self.law(candidate, partner);
+        for (candidate, predecessors) in self.candidates.iter().zip(&self.predecessors) {
+            let partner = predecessors.own.and_then(|number| self.memory?.points.get(number));
+            let law = self.law(candidate, predecessors, partner);
             system.clear_for(weights);
             let state = match self.chain.order {
                 0 => self.add::<1>(candidate, &law, weights, &mut system),
@@ -299,7 +329,7 @@ impl<'a> ChainNow<'a> {
                 _ => self.add::<4>(candidate, &law, weights, &mut system),
             };
             let Some(state) = state else { continue };
-            visit(&PointNow { candidate, number, partner, law, state }, &system);
+            visit(&PointNow { candidate, predecessors, partner, law, state }, &system);
         }
     }
 
@@ -318,6 +348,25 @@ impl<'a> ChainNow<'a> {
         let place = (0..N).fold(Vec3::ZERO, |sum, i| sum + nodes[i].place * shape.values[i]);
         let distance = candidate.distance(&self.surface.surface, self.carrier.on_surface(place))?;
         Some(add_point(&nodes, &shape, &self.carrier, &distance, law, weights, out))
+    }
+
+    /// The points with a force, for memory. Points that an augmentation finds open keep the traction of
+    /// the last converged state, which returns with the contact.
+    fn points(&self, accepts: bool) -> Vec<PointMemory> {
+        let known = self.memory.map_or(&[][..], |memory| &memory.points);
+        let mut goes_on = vec![accepts; known.len()];
+        let mut points = Vec::new();
+        self.each_point(Weights::NONE, &mut |point, _| {
+            if point.state.normal_force.force > 0.0 {
+                points.push(self.memory_of(point, accepts));
+                point.predecessors.all().for_each(|number| goes_on[number] = true);
+            }
+        });
+        let opened =
+            known.iter().zip(&goes_on).filter(|(_, goes_on)| !**goes_on).filter_map(|(point, _)| point.opened());
+        points.extend(opened);
+        points.sort_by(|a, b| a.place.total_cmp(&b.place));
+        points
     }
 
     fn node(&self, node: &ChainNode, number: usize, rubs: bool) -> ContactNode {
@@ -341,30 +390,23 @@ impl<'a> ChainNow<'a> {
         NodeBefore { place: node.place - carrier, rotation: Mat3::IDENTITY }
     }
 
-    fn law(&self, candidate: &Candidate, partner: Option<&PointMemory>) -> ContactLaw {
+    fn law(&self, candidate: &Candidate, predecessors: &Predecessors, partner: Option<&PointMemory>) -> ContactLaw {
         let contacts = &self.at.contacts;
         let stiffness = self.chain.stiffness[candidate.element];
-        let (normal, first) = match contacts.regime {
-            ContactRegime::Augmented => {
-                let normal = NormalLaw::Augmented {
-                    multiplier: partner.map_or(0.0, |point| point.multiplier),
-                    stiffness: stiffness.augmented * contacts.factor,
-                    touching: TOUCHING * self.laws.penetration,
-                };
-                (normal, stiffness.augmented)
-            }
-            ContactRegime::Penalty => {
-                let normal = NormalLaw::Penalty { stiffness: stiffness.penalty, damping: self.laws.damping, toe: 0.0 };
-                (normal, stiffness.penalty)
-            }
+        let first = stiffness.first(contacts.regime);
+        let normal = match contacts.regime {
+            ContactRegime::Augmented => NormalLaw::Augmented {
+                multiplier: partner.map_or(0.0, |point| point.multiplier),
+                stiffness: first * contacts.factor,
+                touching: TOUCHING * self.laws.penetration,
+            },
+            ContactRegime::Penalty => NormalLaw::Penalty { stiffness: first, damping: self.laws.damping, toe: 0.0 },
         };
         let coefficient = self.laws.friction_at(self.chain.fraction(candidate));
         let friction = (coefficient > 0.0).then_some(FrictionLaw { coefficient, stiffness: self.laws.stick * first });
-        let carried = partner.map_or(CarriedTraction::default(), |point| CarriedTraction {
-            force: point.traction,
-            normal: point.normal,
-            slides: point.slides && contacts.goes_on,
-        });
+        let points = self.memory.map_or(&[][..], |memory| &memory.points);
+        let carried = predecessors.traction(1.0, &|number| (&points[number], 1.0));
+        let carried = CarriedTraction { goes_on: contacts.goes_on, ..carried };
         let is_penalty = contacts.regime == ContactRegime::Penalty;
         let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.offset);
         ContactLaw { radius: self.chain.radius + offset, normal, friction, carried, place: candidate.place }
@@ -374,14 +416,8 @@ impl<'a> ChainNow<'a> {
     /// those of the last one.
     fn memory_of(&self, point: &PointNow, accepts: bool) -> PointMemory {
         let PointNow { candidate, state, law, .. } = point;
-        let slides = state.status() == Status::Slides;
         let rotation = &self.carrier.rotation.r;
-        let carried = if accepts {
-            let now = CarriedTraction { force: state.traction.force, normal: state.normal, slides };
-            self.laws.carried(law.friction.as_ref(), state.normal_force.force, now)
-        } else {
-            law.carried
-        };
+        let carried = if accepts { self.laws.carried(law.friction.as_ref(), state) } else { law.carried };
         let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
         let gap = state.gap + law.radius - self.chain.radius;
         let force = state.normal_force.force;
@@ -398,7 +434,7 @@ impl<'a> ChainNow<'a> {
             gap,
             traction: carried.force,
             normal: carried.normal,
-            slides: carried.slides,
+            onward: carried.onward,
             offset: before.map_or(0.0, |before| before.offset),
             steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
             push: *rotation * state.force(),
@@ -444,20 +480,9 @@ fn sum<const N: usize>(factors: &[f64; N], places: &[Vec3; N]) -> Vec3 {
 }
 
 impl PointNow<'_> {
-    /// Energy that friction has taken since the last converged state: the work of the mean traction
-    /// over the sliding, less what elastic stick has stored.
-    fn dissipated(&self) -> f64 {
-        let Some(friction) = self.law.friction else { return 0.0 };
-        let traction = &self.state.traction;
-        let before = self.law.carried.carried_to(self.state.normal);
-        let mean = (traction.force + before) * 0.5;
-        -mean.dot(traction.sliding) - friction.energy(traction.force) + friction.energy(before)
-    }
-
-    /// The stored energy.
-    fn energy(&self) -> f64 {
-        let stick = self.law.friction.map_or(0.0, |friction| friction.energy(self.state.traction.force));
-        self.law.normal.energy(self.state.gap) + stick
+    /// The work of friction since the last converged state.
+    fn friction_work(&self) -> f64 {
+        self.state.traction.work(&self.law.carried, self.state.normal, self.predecessors.is_new())
     }
 }
 
@@ -628,7 +653,10 @@ impl Contacts for SurfaceContacts {
         if at.contacts.regime == ContactRegime::Penalty {
             self.judge_penalty(at);
         }
-        let dissipated = self.remember(at, true);
+        let work = self.friction_work(at);
+        self.remember(at, true);
+        // What friction has taken is its work, less what elastic stick has stored.
+        let dissipated = self.stick_energy(before) - work - self.stick_energy(at);
         let power = self.damping_power(at);
         let passed = at.time - before.time;
         at.contacts.dissipated += dissipated + 0.5 * (at.contacts.damping_power + power) * passed;
@@ -651,11 +679,12 @@ impl Contacts for SurfaceContacts {
                     slides.push(point.state.status() == Status::Slides);
                 }
             });
-            let partners = chain.chain.matched(&active, memory);
+            let predecessors = chain.chain.predecessors(&active, memory);
+            let is_new = predecessors.iter().any(|predecessors| predecessors.own.is_none());
             let is_other = active.len() != memory.map_or(0, |memory| memory.points.len());
             if slides.contains(&true) {
                 change = ContactChange::Slides;
-            } else if change == ContactChange::None && (is_other || partners.contains(&None)) {
+            } else if change == ContactChange::None && (is_other || is_new) {
                 change = ContactChange::Touches;
             }
         });
@@ -742,27 +771,30 @@ impl Contacts for SurfaceContacts {
     }
 
     fn energy(&self, at: &State) -> f64 {
-        let mut energy = 0.0;
         if at.contacts.is_clear {
-            return energy;
+            return 0.0;
         }
-        if at.contacts.regime == ContactRegime::Augmented {
-            // The memory holds the tractions of the state.
-            for (number, chain) in self.chains.iter().enumerate() {
-                let laws = &self.laws[chain.contact];
-                let points = at.contacts.chains.get(number).filter(|_| laws.rubs()).map_or(&[][..], |m| &m.points);
-                for point in points {
-                    let element = (point.place as usize).min(chain.elements() - 1);
-                    let first = chain.stiffness[element].augmented;
-                    energy += point.traction.squared() / (2.0 * laws.stick * first);
-                }
+        let mut energy = self.stick_energy(at);
+        if at.contacts.regime == ContactRegime::Penalty {
+            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+                chain.each_point(Weights::NONE, &mut |point, _| energy += point.law.normal.energy(point.state.gap));
+            });
+            energy += self.pairs().energy(at);
+        }
+        energy
+    }
+
+    fn softest_stick(&self, at: &State) -> Option<ElasticStick> {
+        let mut softest = self.pairs().softest_stick(at);
+        self.each_spring(at, &mut |chain, point, stiffness| {
+            if point.sticks() {
+                let contact = self.laws[chain.contact].name.clone();
+                let way = point.traction.norm() / stiffness;
+                let stick = ElasticStick { contact, way, radius: chain.radius };
+                softest = ElasticStick::softer(softest.take(), Some(stick));
             }
-            return energy + self.pairs().stick_energy(at);
-        }
-        self.each_chain(at, Weights::NONE, &mut |_, chain| {
-            chain.each_point(Weights::NONE, &mut |point, _| energy += point.energy());
         });
-        energy + self.pairs().energy(at)
+        softest
     }
 
     fn resultant(&self, number: usize, at: &State) -> ContactResultant {

@@ -1,6 +1,6 @@
 //! A beam or a body in contact: its nodes, its radius, its stiffness.
 
-use crate::system::Node;
+use crate::system::{ContactRegime, Node};
 use crate::tensor::Vec3;
 
 /// A node of a strand.
@@ -21,6 +21,16 @@ pub struct ContactStiffness {
     pub augmented: f64,
     /// Stiffness of the penalty in dynamic stages, force per length
     pub penalty: f64,
+}
+
+impl ContactStiffness {
+    /// That with which a stage begins.
+    pub(super) fn first(&self, regime: ContactRegime) -> f64 {
+        match regime {
+            ContactRegime::Augmented => self.augmented,
+            ContactRegime::Penalty => self.penalty,
+        }
+    }
 }
 
 /// A beam or a body in contact.

@@ -20,6 +20,16 @@
 //! ```
 //!
 //! The tangent of slip is not symmetric.
+//!
+//! A contact that slid goes on at its limit while p rises: its spring, which would have to be drawn
+//! further first, is stiffer on the way onward. With the direction e0 of its traction, carried to e1
+//! as t0 is, and the way onward f = -u.e1 > 0,
+//!
+//! ```text
+//! t* = (as above) + e1 (mu p - |t0|) min(1, f/d),   d = c mu p/K_t,   where mu p > |t0|
+//! ```
+//!
+//! and d is a small part c of the way on which stick alone would reach the limit.
 
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
@@ -29,6 +39,9 @@ const MIN_NORMAL_COSINE: f64 = 0.5;
 
 /// A traction of at least this part of its limit is at the limit, but for round-off.
 const AT_LIMIT: f64 = 1.0 - 1e-9;
+
+/// c: the way on which a contact that slid is again at its limit, over that of one that stuck.
+const ONWARD: f64 = 1e-2;
 
 /// Coulomb's law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,10 +59,12 @@ pub struct CarriedTraction {
     pub(crate) force: Vec3,
     /// n0, the normal to which it was tangential
     pub(crate) normal: Vec3,
-    /// True if it slid: with its force at the limit it goes on sliding in the first tangent of a
-    /// step. Otherwise all points would stick there, and a rope that is pulled over a drum would be
-    /// torn apart by each first correction.
-    pub(crate) slides: bool,
+    /// e0, the direction of the traction if it slid, tangential to n0; zero otherwise
+    pub(crate) onward: Vec3,
+    /// True if a contact that slid, with its force at the limit, goes on sliding in the first tangent
+    /// of a step. Otherwise all points would stick there, and a rope that is pulled over a drum would
+    /// be torn apart by each first correction.
+    pub(crate) goes_on: bool,
 }
 
 impl CarriedTraction {
@@ -58,7 +73,50 @@ impl CarriedTraction {
         if self.force == Vec3::ZERO {
             return Vec3::ZERO;
         }
-        self.force - (self.normal + n) * (n.dot(self.force) / (1.0 + self.normal.dot(n)))
+        Turn::new(self.normal, n).of(self.force).value
+    }
+
+    /// It in other axes.
+    pub fn turned(&self, rotation: &Mat3) -> Self {
+        let [force, normal, onward] = [self.force, self.normal, self.onward].map(|vector| *rotation * vector);
+        Self { force, normal, onward, ..*self }
+    }
+
+    /// True if it slid.
+    pub fn slides(&self) -> bool {
+        self.onward != Vec3::ZERO
+    }
+}
+
+/// The smallest rotation n0 -> n, of vectors normal to n0.
+#[derive(Clone, Copy)]
+struct Turn<T> {
+    n0: Vec3<T>,
+    n: Vec3<T>,
+    /// 1 + n0.n
+    cosine: T,
+}
+
+/// A turned vector with its derivative over n.
+#[derive(Clone, Copy)]
+struct Turned<T> {
+    value: Vec3<T>,
+    over_normal: Mat3<T>,
+}
+
+impl<T: Real> Turn<T> {
+    fn new(n0: Vec3, n: Vec3<T>) -> Self {
+        let n0 = Vec3::constant(n0);
+        Self { n0, n, cosine: T::one() + n0.dot(n) }
+    }
+
+    fn of(&self, vector: Vec3) -> Turned<T> {
+        let Self { n0, n, cosine } = *self;
+        let vector = Vec3::constant(vector);
+        let s = T::one() / cosine;
+        let lift = n.dot(vector) * s;
+        let by_normal = (n0 + n).outer(vector * s - n0 * (lift * s)) + Mat3::identity() * lift;
+        Turned { value: vector - (n0 + n) * lift, over_normal: -by_normal }
     }
 }
 
@@ -110,13 +168,24 @@ impl<T: Real> Traction<T> {
     }
 }
 
+impl Traction {
+    /// The work of friction since the last converged state: that of the mean of both tractions over
+    /// the sliding; negative where friction takes energy. A contact `is_new` that began in between:
+    /// its traction rose from zero, whatever it took over.
+    pub fn work(&self, carried: &CarriedTraction, n: Vec3, is_new: bool) -> f64 {
+        let before = if is_new { Vec3::ZERO } else { carried.carried_to(n) };
+        (self.force + before).dot(self.sliding) * 0.5
+    }
+}
+
 impl FrictionLaw {
     /// The traction of a contact with the normal `n`, the force `p` and the sliding `a`.
     pub fn traction<T: Real>(&self, carried: &CarriedTraction, n: Vec3<T>, p: T, a: Vec3<T>) -> Traction<T> {
-        let trial = self.trial(carried, n, a);
+        let trial = self.trial(carried, n, p, a);
         let limit = p * self.coefficient;
         let size = trial.force.norm();
-        let goes_on = carried.slides && size.largest() > 0.0 && size.largest() >= AT_LIMIT * limit.largest();
+        let is_tied = size.largest() > 0.0 && size.largest() >= AT_LIMIT * limit.largest();
+        let goes_on = carried.goes_on && carried.slides() && is_tied;
         if size.largest() <= limit.largest() && !goes_on {
             return Traction { status: Status::Sticks, ..trial };
         }
@@ -128,49 +197,62 @@ impl FrictionLaw {
             status: Status::Slides,
             over_sliding: across * trial.over_sliding,
             over_normal: across * trial.over_normal,
-            over_pressure: e.scale(self.coefficient),
+            over_pressure: across * trial.over_pressure + e.scale(self.coefficient),
             ..trial
         }
     }
 
     /// The traction t* without a limit.
-    fn trial<T: Real>(&self, carried: &CarriedTraction, n: Vec3<T>, a: Vec3<T>) -> Traction<T> {
-        let identity = Mat3::identity();
+    fn trial<T: Real>(&self, carried: &CarriedTraction, n: Vec3<T>, p: T, a: Vec3<T>) -> Traction<T> {
         let along = n.dot(a);
         let sliding = a - n * along;
-        let mut force = -sliding.scale(self.stiffness);
-        let mut over_normal = (Mat3::diagonal([along; 3]) + n.outer(a)).scale(self.stiffness);
-        let mut turned_over = false;
-        if carried.force != Vec3::ZERO {
-            let t0 = Vec3::constant(carried.force);
-            let n0 = Vec3::constant(carried.normal);
-            let cosine = T::one() + n0.dot(n);
-            turned_over = cosine.largest() < MIN_NORMAL_COSINE;
-            let s = T::one() / cosine;
-            let lift = n.dot(t0) * s;
-            force += t0 - (n0 + n) * lift;
-            over_normal -= (n0 + n).outer(t0 * s - n0 * (lift * s)) + identity * lift;
-        }
-        Traction {
-            force,
+        let mut trial = Traction {
+            force: -sliding.scale(self.stiffness),
             sliding,
-            turned_over,
-            over_sliding: (n.outer(n) - identity).scale(self.stiffness),
-            over_normal,
+            over_sliding: (n.outer(n) - Mat3::identity()).scale(self.stiffness),
+            over_normal: (Mat3::diagonal([along; 3]) + n.outer(a)).scale(self.stiffness),
             ..Traction::none()
+        };
+        if carried.force == Vec3::ZERO && !carried.slides() {
+            return trial;
         }
+        let turn = Turn::new(carried.normal, n);
+        trial.turned_over = turn.cosine.largest() < MIN_NORMAL_COSINE;
+        let before = turn.of(carried.force);
+        trial.force += before.value;
+        trial.over_normal += before.over_normal;
+        if carried.slides() {
+            self.add_onward(turn.of(carried.onward), carried.force.norm(), p, [n, a], &mut trial);
+        }
+        trial
     }
 
-    /// The energy of elastic stick at a traction.
-    pub fn energy(&self, traction: Vec3) -> f64 {
-        traction.squared() / (2.0 * self.stiffness)
-    }
-
-    /// The work that friction has dissipated since the last converged state: -t.u less the growth of
-    /// the elastic energy. It is not negative; in stick it is |t - t0|^2/(2 K_t), of second order in
-    /// the step, since t stands for all of the step.
-    pub fn dissipation(&self, carried: &CarriedTraction, traction: &Traction) -> f64 {
-        -traction.force.dot(traction.sliding) - self.energy(traction.force) + self.energy(carried.force)
+    /// Adds e1 (mu p - |t0|) min(1, f/d) to a traction. `before`: |t0|.
+    fn add_onward<T: Real>(&self, e1: Turned<T>, before: f64, p: T, [n, a]: [Vec3<T>; 2], trial: &mut Traction<T>) {
+        let direction = e1.value;
+        let limit = p * self.coefficient;
+        let way = -direction.dot(trial.sliding);
+        if limit.largest() <= before || way.largest() <= 0.0 {
+            return;
+        }
+        let missing = limit - T::constant(before);
+        // (mu p - |t0|)/d
+        let stiffness = missing / limit * (self.stiffness / ONWARD);
+        let by_way = way * stiffness;
+        let added = if missing.largest() <= by_way.largest() {
+            trial.over_pressure += direction.scale(self.coefficient);
+            missing
+        } else {
+            // df = -e1.du - u.de1
+            let over_sliding = -(direction - n * n.dot(direction));
+            let over_normal = direction * n.dot(a) + a * n.dot(direction) - e1.over_normal.transpose_mul(trial.sliding);
+            trial.over_sliding += direction.outer(over_sliding * stiffness);
+            trial.over_normal += direction.outer(over_normal * stiffness);
+            trial.over_pressure += direction * (way * (self.stiffness / ONWARD * before) / (limit * p));
+            by_way
+        };
+        trial.force += direction * added;
+        trial.over_normal += e1.over_normal * added;
     }
 }
 
@@ -179,18 +261,30 @@ mod tests {
     use super::super::dual::{Dual, Random, jacobian, variables};
     use super::*;
 
+    impl FrictionLaw {
+        /// The work of the present traction over the sliding, less the growth of the energy of elastic
+        /// stick. It is not negative; in stick it is |t - t0|^2/(2 K_t).
+        pub fn dissipation(&self, carried: &CarriedTraction, traction: &Traction) -> f64 {
+            let stored = |traction: Vec3| traction.squared() / (2.0 * self.stiffness);
+            -traction.force.dot(traction.sliding) - stored(traction.force) + stored(carried.force)
+        }
+    }
+
     #[test]
     fn tractions_have_their_derivatives() {
         let mut random = Random(5);
         let mut counts = [0; 2];
         let mut worst = 0.0f64;
-        for _ in 0..600 {
+        for k in 0..1200 {
             let law = FrictionLaw { coefficient: random.between(0.1, 0.8), stiffness: random.between(0.5, 5.0) };
             let n0 = random.direction();
             let free = random.vector(1.0);
-            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+            let force = free - n0 * n0.dot(free);
+            let onward = if k % 2 == 0 { Vec3::ZERO } else { force.normalized().unwrap() };
+            let carried = CarriedTraction { force, normal: n0, onward, goes_on: false };
             let n = (n0 + random.vector(0.4)).normalized().unwrap();
-            let a = random.vector(0.5);
+            // Some ways onward are so short that the stiffer spring is not yet at the limit.
+            let a = random.vector(if k % 4 == 1 { 5e-3 } else { 0.5 });
             let p = random.between(0.1, 4.0);
             type D = Dual<7>;
             let exact = law.traction(&carried, variables::<7>(n, 0), D::variable(p, 6), variables(a, 3));
@@ -218,7 +312,7 @@ mod tests {
             let law = FrictionLaw { coefficient: random.between(0.1, 0.8), stiffness: random.between(0.5, 5.0) };
             let n0 = random.direction();
             let free = random.vector(1.0);
-            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
             let n = (n0 + random.vector(0.5)).normalized().unwrap();
             let traction = law.traction(&carried, n, random.between(0.1, 4.0), random.vector(0.5));
             least = least.min(law.dissipation(&carried, &traction));
@@ -233,7 +327,7 @@ mod tests {
         for _ in 0..300 {
             let n0 = random.direction();
             let free = random.vector(1.0);
-            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
             let n = (n0 + random.vector(0.5)).normalized().unwrap();
             let law = FrictionLaw { coefficient: 1.0, stiffness: 1.0 };
             let traction = law.traction(&carried, n, 1e3, Vec3::ZERO);

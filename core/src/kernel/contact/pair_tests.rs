@@ -226,7 +226,7 @@ fn set_friction<const NA: usize, const NB: usize>(random: &mut Random, scene: &m
     let normal = scene.now(Weights::NONE).1.normal;
     let n0 = (normal + random.vector(0.2)).normalized().unwrap();
     let free = random.vector(0.3);
-    scene.law.carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+    scene.law.carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
     scene.law.friction =
         Some(FrictionLaw { coefficient: random.between(0.1, 1.5), stiffness: random.between(0.5, 3.0) });
 }
@@ -330,7 +330,8 @@ fn rigid_motions_within_a_step_do_not_slide() {
         scene.b.iter_mut().for_each(remember);
         let n0 = scene.now(Weights::NONE).1.normal;
         let free = random.vector(0.3);
-        scene.law.carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+        scene.law.carried =
+            CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
         scene.law.friction = Some(FrictionLaw { coefficient: 100.0, stiffness: 2.0 });
         let by = random.rotation(3.0).r;
         let (_, state) = scene.moved(&by, random.vector(2.0)).now(Weights::NONE);

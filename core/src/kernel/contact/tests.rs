@@ -291,7 +291,7 @@ fn set_friction<const N: usize>(random: &mut Random, scene: &mut Scene<N>, norma
     });
     let n0 = (normal + random.vector(0.2)).normalized().unwrap();
     let free = random.vector(0.3);
-    scene.law.carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+    scene.law.carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
     scene.law.friction =
         Some(FrictionLaw { coefficient: random.between(0.1, 1.5), stiffness: random.between(0.5, 3.0) });
 }
@@ -507,7 +507,8 @@ fn at_rest(random: &mut Random, surface: &Surface) -> Scene<3> {
         let (_, state) = scene.now(Weights::NONE);
         let n0 = state.normal;
         let free = random.vector(0.3);
-        scene.law.carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, slides: false };
+        scene.law.carried =
+            CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
         return scene;
     }
 }

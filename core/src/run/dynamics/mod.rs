@@ -102,6 +102,7 @@ impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
     fn judge(&mut self) {
         self.warn_of_imbalance();
         self.warn_of_contacts();
+        self.stage.warn_of_soft_stick();
         self.judge_steps();
     }
 }

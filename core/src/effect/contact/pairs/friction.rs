@@ -5,12 +5,13 @@
 //! lead from global axes to those in which the friction law sees both beams.
 
 use super::candidate::PairCandidate;
-use super::point::{PairPoint, PairsNow};
+use super::point::PairsNow;
 use super::{BeamPairs, PairRole};
+use crate::effect::ElasticStick;
 use crate::effect::contact::laws::ContactLaws;
 use crate::kernel::Weights;
 use crate::kernel::contact::{CarriedTraction, FrictionLaw, NodeBefore};
-use crate::system::{ContactRegime, ListedPair, PairPointMemory, Slot, State};
+use crate::system::{ListedPair, PairPointMemory, Slot, State};
 use crate::tensor::Mat3;
 
 impl BeamPairs {
@@ -54,12 +55,7 @@ impl<'a> PairsNow<'a> {
 
     /// K_t of a pair.
     fn stick(&self, pair: &ListedPair, laws: &ContactLaws) -> f64 {
-        let first = self.stiffness(pair);
-        laws.stick
-            * match self.at.contacts.regime {
-                ContactRegime::Augmented => first.augmented,
-                ContactRegime::Penalty => first.penalty,
-            }
+        laws.stick * self.stiffness(pair).first(self.at.contacts.regime)
     }
 
     /// The node of the second element that carries a pair. It stays where the point moves along the
@@ -79,14 +75,10 @@ impl<'a> PairsNow<'a> {
         along.round().clamp(0.0, order as f64) as usize
     }
 
-    /// The traction of a point at the last converged state, in the axes of its carrier then.
-    pub(super) fn carried(&self, pair: &ListedPair, carrier: usize, partner: &PairPointMemory) -> CarriedTraction {
-        let rotation = self.pose(pair, [1, carrier]).rotation;
-        CarriedTraction {
-            force: rotation.transpose_mul(partner.point.traction),
-            normal: rotation.transpose_mul(partner.point.normal),
-            slides: partner.point.slides && self.at.contacts.goes_on,
-        }
+    /// A traction at the last converged state (global axes then), in the axes of its carrier.
+    pub(super) fn on_carrier(&self, pair: &ListedPair, carrier: usize, traction: CarriedTraction) -> CarriedTraction {
+        let axes = self.pose(pair, [1, carrier]).rotation.transpose();
+        CarriedTraction { goes_on: self.at.contacts.goes_on, ..traction.turned(&axes) }
     }
 
     /// A node of a pair, by its side and its number, as the carrier saw it at the last converged
@@ -108,28 +100,53 @@ impl<'a> PairsNow<'a> {
     }
 }
 
-impl PairPoint<'_> {
-    /// The work that friction has done on both beams since the last converged state, of the mean
-    /// traction; negative.
-    pub(super) fn friction_work(&self) -> f64 {
-        let traction = &self.state.traction;
-        let before = self.law.carried.carried_to(self.state.normal);
-        self.candidate.weight * (traction.force + before).dot(traction.sliding) * 0.5
-    }
-}
-
 impl PairRole<'_> {
+    /// The work of friction on both beams since the last converged state.
+    pub(in crate::effect::contact) fn friction_work(self, at: &State) -> f64 {
+        let mut work = 0.0;
+        if self.rubs() {
+            self.now(at).each_point(Weights::NONE, &mut |point, _| {
+                let traction = &point.state.traction;
+                let of_point = traction.work(&point.law.carried, point.state.normal, point.predecessors.is_new());
+                work += point.candidate.weight * of_point;
+            });
+        }
+        work
+    }
+
     /// The energy of elastic stick of the points in memory.
     pub(in crate::effect::contact) fn stick_energy(self, at: &State) -> f64 {
-        let now = self.now(at);
-        let of_point = |point: &PairPointMemory| {
-            let laws = self.law_of(point.meeting);
-            if !laws.rubs() {
-                return 0.0;
+        let mut energy = 0.0;
+        self.each_spring(at, &mut |point, stiffness| {
+            energy += point.weight * point.point.traction.squared() / (2.0 * stiffness);
+        });
+        energy
+    }
+
+    /// The point that sticks by the longest way of its spring, over the smaller radius.
+    pub(in crate::effect::contact) fn softest_stick(self, at: &State) -> Option<ElasticStick> {
+        let mut softest = None;
+        self.each_spring(at, &mut |point, stiffness| {
+            if point.point.sticks() {
+                let [a, b] = self.pairs.both(point.meeting as usize);
+                let contact = self.law_of(point.meeting).name.clone();
+                let way = point.point.traction.norm() / stiffness;
+                let stick = ElasticStick { contact, way, radius: a.radius.min(b.radius) };
+                softest = ElasticStick::softer(softest.take(), Some(stick));
             }
-            point.weight * point.point.traction.squared() / (2.0 * now.stick(&now.pair_of(point), laws))
-        };
-        at.contacts.pairs.points.iter().map(of_point).sum()
+        });
+        softest
+    }
+
+    /// Shows the points in memory of contacts with friction, with the stiffness K_t of stick.
+    fn each_spring(self, at: &State, show: &mut dyn FnMut(&PairPointMemory, f64)) {
+        let now = self.now(at);
+        for point in at.contacts.pairs.points.iter() {
+            let laws = self.law_of(point.meeting);
+            if laws.rubs() {
+                show(point, now.stick(&now.pair_of(point), laws));
+            }
+        }
     }
 
     /// A node at a point with friction whose normal has turned over since the last converged state.

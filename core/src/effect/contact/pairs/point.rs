@@ -2,12 +2,12 @@
 
 use super::candidate::{PairCandidate, PointWeights, Side, candidates};
 use super::{BeamPairs, ElementOf};
-use crate::effect::contact::chain::LARGEST_SHIFT;
 use crate::effect::contact::laws::{ContactLaws, TOUCHING};
+use crate::effect::contact::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
 use crate::effect::contact::strand::ContactStiffness;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::{
-    CarriedTraction, ContactNode, NodeBefore, NormalLaw, PairLaw, PairSide, PointState, ShapeAt, Status, add_pair,
+    CarriedTraction, ContactNode, NodeBefore, NormalLaw, PairLaw, PairSide, PointState, ShapeAt, add_pair,
 };
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
@@ -24,8 +24,14 @@ pub(super) struct PairPoint<'a> {
     pub(super) number: usize,
     pub(super) pair: ListedPair,
     pub(super) candidate: PairCandidate,
-    /// Number of the point that it was, and its memory
-    pub(super) partner: Option<(usize, &'a PairPointMemory)>,
+    /// The points of its meeting in memory that it was
+    pub(super) predecessors: Predecessors,
+    /// The number of the first point of its meeting in memory
+    first_known: usize,
+    /// The memory of the point that it was
+    partner: Option<&'a PairPointMemory>,
+    /// The traction that it took over (global axes at the last converged state)
+    carried: CarriedTraction,
     pub(super) law: PairLaw,
     /// Normal and traction in the axes of the carrier
     pub(super) state: PointState,
@@ -43,6 +49,11 @@ impl PairPoint<'_> {
         self.carrier * self.state.normal
     }
 
+    /// Numbers of the points in memory of which it is the successor.
+    pub fn successions(&self) -> impl Iterator<Item = usize> + '_ {
+        self.predecessors.all().map(|number| self.first_known + number)
+    }
+
     /// The friction on the first beam without the weight (global axes).
     pub fn traction(&self) -> Vec3 {
         self.carrier * self.state.traction.force
@@ -55,12 +66,15 @@ struct Found {
     candidate: PairCandidate,
 }
 
-/// A candidate with its pair, and the point in memory that it was.
+/// A candidate with its pair, and the points in memory that it was.
 struct Part<'a> {
     number: usize,
     pair: ListedPair,
     candidate: PairCandidate,
-    partner: Option<(usize, &'a PairPointMemory)>,
+    predecessors: Predecessors,
+    first_known: usize,
+    partner: Option<&'a PairPointMemory>,
+    carried: CarriedTraction,
 }
 
 /// A look at listed pairs in a state.
@@ -126,8 +140,8 @@ impl<'a> PairsNow<'a> {
         weights: Weights,
         visit: &mut dyn FnMut(&PairPoint<'a>, &ElementSystem),
     ) {
-        let memory = self.memory_of_meeting(group[0].meeting);
-        let reach = self.reach(memory.1, laws);
+        let (first_known, known) = self.memory_of_meeting(group[0].meeting);
+        let reach = self.reach(known, laws);
         let mut found = Vec::new();
         for (number, pair) in (first..).zip(group) {
             if self.pairs.chord_gap(pair, &self.places) <= reach {
@@ -139,15 +153,16 @@ impl<'a> PairsNow<'a> {
         if self.at.contacts.regime == ContactRegime::Penalty {
             self.keep_nearest(&mut found);
         }
-        let partners = self.matched(&found, memory.1);
+        let all = self.predecessors(&found, known, laws);
         let orders = self.pairs.both(group[0].meeting as usize).map(|strand| strand.order);
         let mut system = ElementSystem::new(2 * (orders[0] + orders[1] + 2));
-        for (Found { number, candidate }, partner) in found.iter().zip(partners) {
-            let partner = partner.map(|own| (memory.0 + own, &memory.1[own]));
-            let law = self.law(&self.list[*number], candidate, partner.map(|(_, memory)| memory), laws);
+        for (&Found { number, candidate }, predecessors) in found.iter().zip(all) {
+            let partner = predecessors.own.map(|own| &known[own]);
+            let carried = predecessors.traction(candidate.weight, &|own| (&known[own].point, known[own].weight));
+            let part = Part { number, pair: self.list[number], candidate, predecessors, first_known, partner, carried };
+            let law = self.law(&part, laws);
             system.clear_for(weights);
-            let part = Part { number: *number, pair: self.list[*number], candidate: *candidate, partner };
-            let point = of_orders!(orders, self.point(&part, law, weights, &mut system));
+            let point = of_orders!(orders, self.point(part, law, weights, &mut system));
             if let Some(point) = point {
                 visit(&point, &system);
             }
@@ -279,40 +294,29 @@ impl<'a> PairsNow<'a> {
     pub fn is_among(&self, point: &PairPoint, memory: &[PairPointMemory]) -> bool {
         let first = memory.partition_point(|known| known.meeting < point.pair.meeting);
         let end = memory.partition_point(|known| known.meeting <= point.pair.meeting);
-        !self.links(&point.pair, &point.candidate, &memory[first..end]).is_empty()
+        let links = self.links(&point.pair, &point.candidate, &memory[first..end]);
+        links.iter().any(|link| link.relation == Relation::Same)
     }
 
-    /// The number of the last point in memory of each candidate: the nearest ones first, each once.
-    fn matched(&self, found: &[Found], memory: &[PairPointMemory]) -> Vec<Option<usize>> {
-        let mut partner = vec![None; found.len()];
-        let mut all: Vec<(f64, usize, usize)> = Vec::new();
-        for (k, Found { number, candidate }) in found.iter().enumerate() {
-            let own = self.links(&self.list[*number], candidate, memory);
-            all.extend(own.into_iter().map(|(shift, j)| (shift, k, j)));
+    /// The points in memory that each candidate was.
+    fn predecessors(&self, found: &[Found], known: &[PairPointMemory], laws: &ContactLaws) -> Vec<Predecessors> {
+        let mut all = Vec::new();
+        for (candidate, Found { number, candidate: at }) in found.iter().enumerate() {
+            let links = self.links(&self.list[*number], at, known);
+            all.extend(links.into_iter().map(|link| Link { candidate, ..link }));
         }
-        all.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        let mut taken = vec![false; memory.len()];
-        for (_, k, j) in all {
-            if partner[k].is_none() && !taken[j] {
-                partner[k] = Some(j);
-                taken[j] = true;
-            }
-        }
-        partner
+        // Friction alone is taken over from points beside.
+        all.retain(|link| laws.rubs() || link.relation == Relation::Same);
+        Predecessors::of(all, found.len(), known.len())
     }
 
-    fn law(
-        &self,
-        pair: &ListedPair,
-        candidate: &PairCandidate,
-        partner: Option<&PairPointMemory>,
-        laws: &ContactLaws,
-    ) -> PairLaw {
+    fn law(&self, part: &Part, laws: &ContactLaws) -> PairLaw {
+        let Part { pair, candidate, partner, .. } = part;
         let contacts = &self.at.contacts;
         let stiffness = self.stiffness(pair);
         let normal = match contacts.regime {
             ContactRegime::Augmented => NormalLaw::Augmented {
-                multiplier: partner.map_or(0.0, |point| point.point.multiplier),
+                multiplier: partner.map_or(0.0, |known| known.point.multiplier),
                 stiffness: stiffness.augmented * contacts.factor,
                 touching: TOUCHING * laws.penetration,
             },
@@ -322,13 +326,11 @@ impl<'a> PairsNow<'a> {
         };
         let [a, b] = self.pairs.both(pair.meeting as usize);
         let is_penalty = contacts.regime == ContactRegime::Penalty;
-        let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.point.offset);
+        let offset = partner.filter(|_| is_penalty).map_or(0.0, |known| known.point.offset);
         let friction = self.friction(pair, candidate, laws);
-        let carrier = if friction.is_some() { self.carrier(pair, partner) } else { 0 };
-        let carried = match (friction, partner) {
-            (Some(_), Some(partner)) => self.carried(pair, carrier, partner),
-            _ => CarriedTraction::default(),
-        };
+        let carrier = if friction.is_some() { self.carrier(pair, *partner) } else { 0 };
+        let carried =
+            if friction.is_some() { self.on_carrier(pair, carrier, part.carried) } else { CarriedTraction::default() };
         PairLaw {
             radii: [a.radius + offset, b.radius],
             normal,
@@ -342,12 +344,12 @@ impl<'a> PairsNow<'a> {
 
     fn point<const NA: usize, const NB: usize>(
         &self,
-        part: &Part<'a>,
+        part: Part<'a>,
         law: PairLaw,
         weights: Weights,
         out: &mut ElementSystem,
     ) -> Option<PairPoint<'a>> {
-        let Part { number, pair, candidate, partner } = *part;
+        let Part { number, pair, candidate, predecessors, first_known, partner, carried } = part;
         let a = self.pair_side::<NA>(&pair, 0, candidate.at[0], &law);
         let b = self.pair_side::<NB>(&pair, 1, candidate.at[1], &law);
         let state = add_pair(&a, &b, &law, weights, out)?;
@@ -355,7 +357,21 @@ impl<'a> PairsNow<'a> {
         shapes[0][..NA].copy_from_slice(&a.shape.values);
         shapes[1][..NB].copy_from_slice(&b.shape.values);
         let carrier = b.nodes[law.carrier].rotation.r;
-        Some(PairPoint { number, pair, candidate, partner, law, state, carrier, place: a.place(), shapes })
+        let place = a.place();
+        Some(PairPoint {
+            number,
+            pair,
+            candidate,
+            predecessors,
+            first_known,
+            partner,
+            carried,
+            law,
+            state,
+            carrier,
+            place,
+            shapes,
+        })
     }
 
     /// One of both elements of a pair at the place of a point.
@@ -388,18 +404,12 @@ impl<'a> PairsNow<'a> {
         // Stages go on with the first stiffness.
         let first = self.stiffness(pair).augmented * contacts.first_factor;
         let is_penalty = contacts.regime == ContactRegime::Penalty;
-        let before = point.partner.filter(|_| is_penalty).map(|(_, before)| before.point);
-        let known = point.partner.map_or(CarriedTraction::default(), |(_, known)| CarriedTraction {
-            force: known.point.traction,
-            normal: known.point.normal,
-            slides: known.point.slides,
-        });
+        let before = point.partner.filter(|_| is_penalty).map(|before| before.point);
         let carried = if accepts {
-            let slides = state.status() == Status::Slides;
-            let now = CarriedTraction { force: point.traction(), normal, slides };
-            self.laws[self.pairs.contact_of(pair.meeting as usize)].carried(law.friction.as_ref(), force, now)
+            let laws = &self.laws[self.pairs.contact_of(pair.meeting as usize)];
+            laws.carried(law.friction.as_ref(), state).turned(&point.carrier)
         } else {
-            known
+            point.carried
         };
         PairPointMemory {
             meeting: pair.meeting,
@@ -414,7 +424,7 @@ impl<'a> PairsNow<'a> {
                 gap,
                 traction: carried.force,
                 normal: carried.normal,
-                slides: carried.slides,
+                onward: carried.onward,
                 offset: before.map_or(0.0, |before| before.offset),
                 steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
                 push: (normal * force + point.traction()) * candidate.weight,
@@ -423,9 +433,8 @@ impl<'a> PairsNow<'a> {
         }
     }
 
-    /// The points in memory of a meeting that a candidate may have been, each with the distance of
-    /// its place in elements.
-    fn links(&self, pair: &ListedPair, candidate: &PairCandidate, memory: &[PairPointMemory]) -> Vec<(f64, usize)> {
+    /// The points in memory of a meeting near a candidate, which is number 0.
+    fn links(&self, pair: &ListedPair, candidate: &PairCandidate, memory: &[PairPointMemory]) -> Vec<Link> {
         let strands = self.pairs.both(pair.meeting as usize);
         let along = [0, 1].map(|side| f64::from(pair.elements[side]) + candidate.at[side]);
         // The memory is in the order of places; a ring goes on at its start.
@@ -437,9 +446,12 @@ impl<'a> PairsNow<'a> {
         for (j, point) in memory[first..].iter().take_while(may_be_near).enumerate() {
             let places = [point.point.place, point.on_second];
             let shifts = [0, 1].map(|side| strands[side].shift(places[side], along[side]));
-            if point.kind == candidate.kind && is_near(candidate.kind, shifts, LARGEST_SHIFT) {
-                links.push((shifts[0] + shifts[1], first + j));
+            if shifts.iter().any(|&shift| shift > LARGEST_SHIFT) {
+                continue;
             }
+            let is_same = point.kind == candidate.kind && is_near(candidate.kind, shifts, LARGEST_SHIFT);
+            let relation = if is_same { Relation::Same } else { Relation::Beside };
+            links.push(Link { candidate: 0, point: first + j, relation, shift: shifts[0] + shifts[1] });
         }
         links
     }

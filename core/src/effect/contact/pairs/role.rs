@@ -67,24 +67,20 @@ impl<'a> PairRole<'a> {
         largest
     }
 
-    /// Writes the points with a force into the memory of a state. Gives the energy that friction has
-    /// taken: its work, less what elastic stick has stored.
-    pub fn remember(self, at: &mut State, accepts: bool) -> f64 {
+    /// Writes the points with a force into the memory of a state.
+    pub fn remember(self, at: &mut State, accepts: bool) {
         let known = at.contacts.pairs.points.clone();
-        let mut goes_on = vec![false; known.len()];
+        let mut goes_on = vec![accepts; known.len()];
         let mut points = Vec::new();
-        let mut taken = if accepts { self.stick_energy(at) } else { 0.0 };
         let now = self.now(at);
         now.each_point(Weights::NONE, &mut |point, _| {
             if point.state.normal_force.force > 0.0 {
                 points.push(now.memory_of(point, accepts));
-                point.partner.into_iter().for_each(|(number, _)| goes_on[number] = true);
-                taken -= if accepts { point.friction_work() } else { 0.0 };
+                point.successions().for_each(|number| goes_on[number] = true);
             }
         });
-        if !accepts {
-            points.extend(kept_tractions(&known, &goes_on));
-        }
+        let open = known.iter().zip(&goes_on).filter(|(_, goes_on)| !**goes_on);
+        points.extend(open.filter_map(|(known, _)| Some(PairPointMemory { point: known.point.opened()?, ..*known })));
         let order = |a: &PairPointMemory, b: &PairPointMemory| {
             let places = |point: &PairPointMemory| [point.point.place, point.on_second];
             let [a_places, b_places] = [places(a), places(b)];
@@ -98,7 +94,6 @@ impl<'a> PairRole<'a> {
         if accepts && self.rubs() {
             at.contacts.pairs.nodes = Arc::new(self.pairs.poses(at));
         }
-        if accepts { taken - self.stick_energy(at) } else { 0.0 }
     }
 
     /// Shares forces as the law of a stage that begins wants it.
@@ -235,7 +230,7 @@ impl<'a> PairRole<'a> {
     pub fn energy(self, at: &State) -> f64 {
         let mut energy = 0.0;
         self.each(at, &mut |point| energy += point.candidate.weight * point.law.normal.energy(point.state.gap));
-        energy + self.stick_energy(at)
+        energy
     }
 
     /// Energy per time that damping takes: p_el c (dg/dt)^2.
@@ -261,8 +256,8 @@ impl<'a> PairRole<'a> {
         self.each(at, &mut |point| {
             let offset = point.law.radii[0] - self.pairs.both(point.pair.meeting as usize)[0].radius;
             deepest = deepest.max(-(point.state.gap + offset) / self.law_of(point.pair.meeting).penetration);
-            if let (Some((number, _)), true) = (point.partner, point.state.normal_force.force > 0.0) {
-                stays[number] = true;
+            if point.state.normal_force.force > 0.0 {
+                point.successions().for_each(|number| stays[number] = true);
             }
         });
         let ended = known.iter().zip(&stays).filter(|(_, stays)| !**stays).map(|(point, _)| point.point.steps);
@@ -282,7 +277,7 @@ impl<'a> PairRole<'a> {
             sum.normal += point.weight * point.point.force;
             sum.friction += point.weight * point.point.traction.norm();
             sum.points += 1;
-            sum.sliding += usize::from(point.point.slides);
+            sum.sliding += usize::from(point.point.onward != Vec3::ZERO);
             if !meeting.is_own() {
                 sum.force += point.point.push;
                 sum.moment += point.point.at.cross(point.point.push);
@@ -332,14 +327,4 @@ impl<'a> PairRole<'a> {
         }
         forces.map(|force| force / strand.share(node / order))
     }
-}
-
-/// Points in memory that an augmentation finds open. Their tractions are those of the last converged
-/// state, and return with the contact.
-fn kept_tractions(known: &[PairPointMemory], goes_on: &[bool]) -> impl Iterator<Item = PairPointMemory> {
-    let open = known.iter().zip(goes_on).filter(|(point, goes_on)| !**goes_on && point.point.traction != Vec3::ZERO);
-    open.map(|(point, _)| PairPointMemory {
-        point: PointMemory { force: 0.0, multiplier: 0.0, ..point.point },
-        ..*point
-    })
 }

@@ -1,0 +1,180 @@
+//! The points of the last look at a contact that its present candidates were: a candidate takes over
+//! their multipliers and tractions.
+//!
+//! Candidates come and go where a contact passes to the next element or edge: two points become one,
+//! or a node gives way to a closest point beside it. Normal forces find themselves anew. Friction
+//! cannot: it follows from the past. So a point that has no successor leaves its traction to the
+//! nearest candidate, and one that touches for the first time beside a sliding point slides as that
+//! does.
+
+use crate::kernel::contact::CarriedTraction;
+use crate::system::PointMemory;
+use crate::tensor::Vec3;
+
+/// The largest distance, in elements, between the places of a contact in two states.
+pub(super) const LARGEST_SHIFT: f64 = 1.5;
+
+/// How a candidate is related to a point in memory. The closest relation comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Relation {
+    /// They touch the same thing
+    Same,
+    /// They touch different edges
+    OtherEdge,
+    /// One touches an edge, the other one a face or a smooth surface
+    OtherFeature,
+    /// The candidate is not that point, but may take over its traction
+    Beside,
+}
+
+/// A candidate and a point in memory near it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Link {
+    /// Number of the candidate
+    pub(super) candidate: usize,
+    /// Number of the point in memory
+    pub(super) point: usize,
+    pub(super) relation: Relation,
+    /// The distance of their places, in elements
+    pub(super) shift: f64,
+}
+
+/// The points in memory from which a candidate takes over.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Predecessors {
+    /// Number of the point that it was
+    pub(super) own: Option<usize>,
+    /// Numbers of points without a successor of their own that are nearest to it
+    pub(super) merged: Vec<usize>,
+    /// Number of the nearest point, of a candidate that was none
+    beside: Option<usize>,
+}
+
+impl Predecessors {
+    /// Those of each candidate. Each point in memory becomes one candidate, the nearest ones of the
+    /// closest relation first.
+    pub fn of(mut links: Vec<Link>, candidates: usize, points: usize) -> Vec<Self> {
+        let mut found = vec![Self::default(); candidates];
+        let mut is_taken = vec![false; points];
+        let numbers = |link: &Link| (link.candidate, link.point);
+        links.sort_by(|a, b| {
+            a.relation.cmp(&b.relation).then(a.shift.total_cmp(&b.shift)).then(numbers(a).cmp(&numbers(b)))
+        });
+        for link in links.iter().filter(|link| link.relation != Relation::Beside) {
+            let own = &mut found[link.candidate].own;
+            if own.is_none() && !is_taken[link.point] {
+                *own = Some(link.point);
+                is_taken[link.point] = true;
+            }
+        }
+        if is_taken.contains(&false) || found.iter().any(|predecessors| predecessors.own.is_none()) {
+            links.sort_by(|a, b| a.shift.total_cmp(&b.shift).then(numbers(a).cmp(&numbers(b))));
+            for link in links {
+                let of_candidate = &mut found[link.candidate];
+                if !is_taken[link.point] {
+                    of_candidate.merged.push(link.point);
+                    is_taken[link.point] = true;
+                } else if of_candidate.own.is_none() {
+                    of_candidate.beside = of_candidate.beside.or(Some(link.point));
+                }
+            }
+        }
+        found
+    }
+
+    /// Numbers of all points of which the candidate is the successor.
+    pub fn all(&self) -> impl Iterator<Item = usize> + '_ {
+        self.own.into_iter().chain(self.merged.iter().copied())
+    }
+
+    /// True if the candidate was none of the points.
+    pub fn is_new(&self) -> bool {
+        self.own.is_none() && self.merged.is_empty()
+    }
+
+    /// The traction that a candidate of this weight takes over. `point` has the memory of a point and
+    /// its weight, by its number. Tractions of points that merge add up, turned to the first normal.
+    pub fn traction<'a>(&self, weight: f64, point: &dyn Fn(usize) -> (&'a PointMemory, f64)) -> CarriedTraction {
+        let carried = |number: usize, part: f64| {
+            let (point, _) = point(number);
+            let force = point.traction * part;
+            CarriedTraction { force, normal: point.normal, onward: point.onward, goes_on: false }
+        };
+        let own = self.own.map(|number| carried(number, 1.0));
+        let merged = self.merged.iter().map(|&number| carried(number, point(number).1 / weight));
+        let beside = || self.beside.map(|number| carried(number, 0.0));
+        own.into_iter().chain(merged).reduce(together).or_else(beside).unwrap_or_default()
+    }
+}
+
+/// Two tractions in one point: the second one is turned to the normal of the first, and lost where
+/// the normals are opposite.
+fn together(a: CarriedTraction, b: CarriedTraction) -> CarriedTraction {
+    if a.force == Vec3::ZERO {
+        return b;
+    }
+    if a.normal.dot(b.normal) <= 0.0 {
+        return a;
+    }
+    let force = a.force + b.carried_to(a.normal);
+    let slides = a.slides() || b.slides();
+    CarriedTraction { force, onward: force.normalized().filter(|_| slides).unwrap_or(Vec3::ZERO), ..a }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn link(candidate: usize, point: usize, relation: Relation, shift: f64) -> Link {
+        Link { candidate, point, relation, shift }
+    }
+
+    fn point(traction: Vec3, normal: Vec3, slides: bool) -> PointMemory {
+        let onward = if slides { traction.normalized().unwrap() } else { Vec3::ZERO };
+        PointMemory { traction, normal, onward, ..PointMemory::default() }
+    }
+
+    #[test]
+    fn each_point_becomes_one_candidate() {
+        let same = |candidate, point, shift| link(candidate, point, Relation::Same, shift);
+        let other = |candidate, point, shift| link(candidate, point, Relation::OtherEdge, shift);
+        // The nearer one of two candidates, and the same edge before another one that is nearer.
+        let found = Predecessors::of(vec![same(0, 0, 0.4), same(1, 0, 0.3), other(1, 1, 0.1), other(2, 1, 0.5)], 3, 2);
+        assert_eq!(found.iter().map(|p| p.own).collect::<Vec<_>>(), [None, Some(0), Some(1)]);
+        assert!(found.iter().all(|p| p.merged.is_empty()));
+        assert_eq!(found[0].beside, Some(0));
+    }
+
+    #[test]
+    fn points_without_a_successor_merge_with_the_nearest() {
+        let links = vec![
+            link(0, 0, Relation::Same, 0.1),
+            link(0, 1, Relation::Same, 0.2),
+            link(1, 2, Relation::Same, 0.1),
+            link(1, 1, Relation::Beside, 0.9),
+        ];
+        let found = Predecessors::of(links, 2, 3);
+        assert_eq!((found[0].own, &found[0].merged[..]), (Some(0), &[1][..]));
+        assert_eq!((found[1].own, &found[1].merged[..]), (Some(2), &[][..]));
+    }
+
+    #[test]
+    fn tractions_of_merged_points_add_up_on_the_tangent_plane() {
+        let [x, y, z] = Vec3::UNIT;
+        let tilted = (z + x * 0.1).normalized().unwrap();
+        let memory = [point(x * 2.0, z, false), point((x - z * 0.1).normalized().unwrap(), tilted, true)];
+        let of = |number: usize| (&memory[number], [1.0, 0.5][number]);
+        let predecessors = Predecessors { own: Some(0), merged: vec![1], beside: None };
+        let both = predecessors.traction(1.0, &of);
+        assert!((both.force - x * 2.5).norm() < 1e-15 && both.normal == z && both.onward == x);
+        // What was never there has no traction, and slides only beside what slides.
+        let beside = |number| Predecessors { beside: Some(number), ..Predecessors::default() };
+        for (number, is_sliding) in [(0, false), (1, true)] {
+            let taken_over = beside(number).traction(1.0, &of);
+            assert_eq!((taken_over.force, taken_over.slides()), (Vec3::ZERO, is_sliding));
+        }
+        let turned = [point(x, z, true), point(y, -z, true)];
+        let of = |number: usize| (&turned[number], 1.0);
+        assert_eq!(predecessors.traction(1.0, &of).force, x);
+    }
+}
