@@ -19,6 +19,7 @@ mod outputs;
 mod picture;
 mod plot;
 mod plot_profile;
+mod plotted;
 mod progress;
 mod report;
 mod restart;

@@ -2,13 +2,11 @@
 
 use super::error::CommandError;
 use super::picture::{Format, PlotArguments};
+use super::plotted::{OneOf, PlottedRun, line_of, unknown, write, y_title};
 use super::status::Status;
 use super::verdict::Verdict;
-use super::{console, json, load, outputs, plot_profile};
-use crate::deck::nearest;
-use crate::output::{
-    Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, PartFile, Record, Scale, Units, quantity_of,
-};
+use super::{console, load, outputs, plot_profile};
+use crate::output::{Axis, Boundary, HistoryReader, Line, LinePlot, Record, Scale, Units};
 use beamsim_core::probe::{Quantity, clocks, quantity};
 use std::path::{Path, PathBuf};
 
@@ -25,10 +23,8 @@ struct NamedHistory {
     /// The path that the user gave
     path: PathBuf,
     history: HistoryReader,
-    /// The record of the run, if run.json is beside the history
-    record: Option<Record>,
-    /// How the run ended, if it did not finish
-    failure: Option<String>,
+    /// The run that it belongs to
+    run: PlottedRun,
     is_reference: bool,
 }
 
@@ -74,14 +70,14 @@ fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
     let mut runs = wanted.results.iter().map(|path| read(path, false)).collect::<Result<Vec<_>, _>>()?;
     runs.extend(wanted.reference.as_ref().map(|path| read(path, true)).transpose()?);
     tell_apart(&mut runs);
-    runs.iter().filter_map(NamedHistory::warning).for_each(|warning| console::note(&warning));
+    runs.iter().filter_map(|run| run.run.warning("history", &run.path)).for_each(|warning| console::note(&warning));
     let columns = columns(wanted, &runs[0].history)?;
     let abscissa = match &wanted.x {
         Some(name) => find(&runs[0].history, name).map(|_| Abscissa::Column(name.clone()))?,
         None => usual_abscissa(&runs),
     };
     let units = common_units(&runs);
-    let y_title = y_title(&columns, &units);
+    let y_title = y_title(&columns, &units, str::to_string);
     let mut lines = Vec::new();
     for (number, run) in runs.iter().enumerate() {
         for (place, column) in columns.iter().enumerate() {
@@ -90,14 +86,12 @@ fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
                 continue;
             }
             let of_column = if y_title.is_empty() { units.title(column, column) } else { column.clone() };
-            // One column needs no name on each line, and its runs differ by colour.
-            let (name, colour, dash) = match (runs.len(), columns.len()) {
-                (1, _) => (of_column, place, 0),
-                (_, 1) => (run.legend(), number, number),
-                _ => (format!("{}: {of_column}", run.legend()), place, number),
-            };
+            let (name, style) = line_of(
+                OneOf { name: run.legend(), number, count: runs.len() },
+                OneOf { name: of_column, number: place, count: columns.len() },
+            );
             let (points, bars) = points(run, &abscissa, column)?;
-            lines.push(Line { name, points, bars, beside: Vec::new(), style: LineStyle::Dashed { colour, dash } });
+            lines.push(Line { name, points, bars, beside: Vec::new(), style });
         }
     }
     let plot = LinePlot {
@@ -108,20 +102,17 @@ fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
         level: None,
         boundaries: abscissa.boundaries(&runs),
     };
-    PartFile::write_to(&path, &format.draw(&plot)?)?;
-    console::line(&format!("{}", path.display()));
-    json::wrote("plot", &path);
-    Ok(())
+    write(&plot, &path, format)
 }
 
 /// The title of the deck if all runs share it, else the names of the runs.
 fn title(runs: &[NamedHistory]) -> String {
     let drawn: Vec<&NamedHistory> = runs.iter().filter(|run| !run.is_reference).collect();
-    let of_deck = |run: &&NamedHistory| run.record.as_ref().and_then(Record::title).map(str::to_string);
+    let of_deck = |run: &&NamedHistory| run.run.title().map(str::to_string);
     let common =
         drawn.first().and_then(of_deck).filter(|title| drawn.iter().all(|run| of_deck(run).as_ref() == Some(title)));
     match &drawn[..] {
-        [run] => common.unwrap_or(run.name.clone()) + &run.remark(),
+        [run] => common.unwrap_or(run.name.clone()) + &run.run.remark(),
         _ => common.unwrap_or_else(|| drawn.iter().map(|run| run.name.as_str()).collect::<Vec<_>>().join(", ")),
     }
 }
@@ -129,24 +120,13 @@ fn title(runs: &[NamedHistory]) -> String {
 /// The units that all runs with a deck share. A stored history is taken to have the units of the runs
 /// that it is compared with.
 fn common_units(runs: &[NamedHistory]) -> Units {
-    let mut known = runs.iter().filter_map(|run| run.record.as_ref()).map(Record::units);
+    let mut known = runs.iter().filter_map(|run| run.run.record.as_ref()).map(Record::units);
     let first = known.next().unwrap_or_default();
     if known.all(|units| units == first) {
         return first;
     }
     console::note("warning: the runs have different units; the plot shows no units");
     Units::default()
-}
-
-/// The title of the vertical axis: the column, or the quantity if all columns show the same one.
-/// Otherwise it is empty, and the legend shows the units.
-fn y_title(columns: &[String], units: &Units) -> String {
-    if let [column] = columns {
-        return units.title(column, column);
-    }
-    let quantity = quantity_of(&columns[0]);
-    let is_common = columns.iter().all(|column| quantity_of(column) == quantity);
-    quantity.filter(|_| is_common).map_or(String::new(), |quantity| units.title(quantity, &columns[0]))
 }
 
 impl Abscissa {
@@ -206,19 +186,15 @@ fn stage_by_stage(stages: &[f64], loads: &[f64]) -> Vec<f64> {
 fn read(path: &Path, is_reference: bool) -> Result<NamedHistory, CommandError> {
     let file = HistoryReader::of_results(path)?.unwrap_or_else(|| path.to_path_buf());
     let history = HistoryReader::read(&file)?;
-    let is_of_run = file.file_name().is_some_and(|name| name == "history.csv" || name == "history.partial.csv");
-    let folder = file.parent().filter(|_| is_of_run).and_then(|folder| std::fs::canonicalize(folder.join(".")).ok());
+    let run = PlottedRun::of(&file, "history");
     // `results/arm/history.csv` is `arm`.
-    let name = folder.as_deref().map_or_else(|| load::without_extension(&file, ".csv"), load::folder_name);
-    let record = folder.and_then(|folder| Record::read(&folder).ok());
-    let is_partial = file.file_name().is_some_and(|name| name == "history.partial.csv");
-    let failure = record.as_ref().and_then(Record::failure).or(is_partial.then_some("unknown")).map(str::to_string);
+    let name = run.folder.as_deref().map_or_else(|| load::without_extension(&file, ".csv"), load::folder_name);
     if history.rows.is_empty() {
         let reason =
-            failure.map_or(String::new(), |failure| format!(": the run failed before its first state ({failure})"));
+            run.failure.map_or(String::new(), |failure| format!(": the run failed before its first state ({failure})"));
         return Err(CommandError::Usage(format!("{} has no rows{reason}", file.display())));
     }
-    Ok(NamedHistory { name, path: path.into(), history, record, failure, is_reference })
+    Ok(NamedHistory { name, path: path.into(), history, run, is_reference })
 }
 
 /// Renames runs that share a name: they are named by their paths.
@@ -239,20 +215,9 @@ impl NamedHistory {
         Ok(self.history.rows.iter().map(|row| row[place]).collect())
     }
 
-    /// A remark for titles, if the run did not finish.
-    fn remark(&self) -> String {
-        self.failure.as_ref().map_or(String::new(), |failure| format!(" (did not finish: {failure})"))
-    }
-
     /// The name of the run in the legend.
     fn legend(&self) -> String {
-        self.name.clone() + &self.remark()
-    }
-
-    /// The warning that the history is incomplete, if it is.
-    fn warning(&self) -> Option<String> {
-        let failure = self.failure.as_ref()?;
-        Some(format!("warning: {}: the run did not finish ({failure}); its history ends there", self.path.display()))
+        self.name.clone() + &self.run.remark()
     }
 
     /// True if the values of a column differ.
@@ -263,13 +228,9 @@ impl NamedHistory {
 
 /// The place of a column.
 fn find(history: &HistoryReader, name: &str) -> Result<usize, CommandError> {
-    history.names.iter().position(|known| known == name).ok_or_else(|| {
-        let help = match nearest(name, history.names.iter().map(String::as_str)) {
-            Some(meant) => format!("did you mean `{meant}`?"),
-            None => format!("there are {}", history.names.join(", ")),
-        };
-        CommandError::Usage(format!("the history has no column `{name}`: {help}"))
-    })
+    let known: Vec<&str> = history.names.iter().map(String::as_str).collect();
+    let place = known.iter().position(|known| *known == name);
+    place.ok_or_else(|| unknown("history", "column", name, &known))
 }
 
 /// The columns that the user names, or the default ones with a line about those that are left out.

@@ -2,9 +2,9 @@
 
 use super::error::CommandError;
 use super::picture::{Format, PlotArguments};
-use super::{console, json, load, outputs};
-use crate::deck::nearest;
-use crate::output::{Axis, Line, LinePlot, LineStyle, PartFile, ProfileReader, Record, Scale, Units, quantity_of};
+use super::plotted::{OneOf, PlottedRun, line_of, unknown, write, y_title};
+use super::{console, load, outputs};
+use crate::output::{Axis, Line, LinePlot, ProfileReader, Record, Scale, Units};
 use std::path::Path;
 
 /// Columns that are drawn without `--column`: the first of these groups of which something is not zero
@@ -39,30 +39,28 @@ pub fn draw(wanted: &PlotArguments, file: &Path) -> Result<(), CommandError> {
     let format = Format::of(&path)?;
     outputs::check_file(&path, format.kind())?;
     let profile = ProfileReader::read(file)?;
+    let run = PlottedRun::of(file, "profile");
     if profile.rows.is_empty() {
-        return Err(CommandError::Usage(format!("{} has no rows", file.display())));
+        return Err(CommandError::Usage(format!("{} has no rows{}", file.display(), run.remark())));
     }
-    let record = file.parent().and_then(|folder| Record::read(folder).ok());
-    let units = record.as_ref().map(Record::units).unwrap_or_default();
+    run.warning("profile", file).iter().for_each(|warning| console::note(warning));
+    let units = run.record.as_ref().map(Record::units).unwrap_or_default();
     let stage = stage(wanted, &profile)?;
     let beams = beams(wanted, &profile)?;
     let columns = columns(wanted, &profile, stage)?;
     let lines = lines(&profile, stage, &beams, &columns, &units);
-    let name =
-        record.as_ref().and_then(Record::title).map_or_else(|| load::without_extension(file, ".csv"), str::to_string);
+    let name = run.title().map_or_else(|| load::without_extension(file, ".csv"), str::to_string);
     let title = if last_stage(&profile) == 1 { name } else { format!("{name}: end of stage {stage}") };
+    let title = title + &run.remark();
     let plot = LinePlot {
         title,
         x: Axis { title: length_title(&units), scale: Scale::Linear },
-        y: Axis { title: y_title(&columns, &units), scale: Scale::Linear },
+        y: Axis { title: y_title(&columns, &units, at_place), scale: Scale::Linear },
         lines,
         level: None,
         boundaries: Vec::new(),
     };
-    PartFile::write_to(&path, &format.draw(&plot)?)?;
-    console::line(&format!("{}", path.display()));
-    json::wrote("plot", &path);
-    Ok(())
+    write(&plot, &path, format)
 }
 
 fn last_stage(profile: &ProfileReader) -> usize {
@@ -81,7 +79,7 @@ fn beams(wanted: &PlotArguments, profile: &ProfileReader) -> Result<Vec<String>,
     let known = profile.beams();
     for name in &wanted.beams {
         if !known.contains(&name.as_str()) {
-            return Err(unknown("beam", name, &known));
+            return Err(unknown("profile", "beam", name, &known));
         }
     }
     let all = || known.iter().map(ToString::to_string).collect();
@@ -91,7 +89,7 @@ fn beams(wanted: &PlotArguments, profile: &ProfileReader) -> Result<Vec<String>,
 fn columns(wanted: &PlotArguments, profile: &ProfileReader, stage: usize) -> Result<Vec<String>, CommandError> {
     let known: Vec<&str> = profile.names.iter().map(String::as_str).collect();
     if let Some(name) = wanted.columns.iter().find(|name| !known.contains(&name.as_str())) {
-        return Err(unknown("column", name, &known));
+        return Err(unknown("profile", "column", name, &known));
     }
     if !wanted.columns.is_empty() {
         return Ok(wanted.columns.clone());
@@ -119,17 +117,9 @@ fn columns(wanted: &PlotArguments, profile: &ProfileReader, stage: usize) -> Res
     Ok(chosen)
 }
 
-fn unknown(kind: &str, name: &str, known: &[&str]) -> CommandError {
-    let help = match nearest(name, known.iter().copied()) {
-        Some(meant) => format!("did you mean `{meant}`?"),
-        None => format!("there are {}", known.join(", ")),
-    };
-    CommandError::Usage(format!("the profile has no {kind} `{name}`: {help}"))
-}
-
-/// A line for each column of each beam. One beam needs no name, and its columns differ by colour.
+/// A line for each column of each beam.
 fn lines(profile: &ProfileReader, stage: usize, beams: &[String], columns: &[String], units: &Units) -> Vec<Line> {
-    let has_one_quantity = !y_title(columns, units).is_empty();
+    let has_one_quantity = !y_title(columns, units, at_place).is_empty();
     let mut lines = Vec::new();
     for (number, beam) in beams.iter().enumerate() {
         for (place, column) in columns.iter().enumerate() {
@@ -137,18 +127,11 @@ fn lines(profile: &ProfileReader, stage: usize, beams: &[String], columns: &[Str
             let rows = profile.rows.iter().filter(|row| row.stage == stage && row.beam == *beam);
             let points = rows.filter_map(|row| Some((row.length, row.values[k]?))).collect();
             let of_column = if has_one_quantity { column.clone() } else { units.title(column, &at_place(column)) };
-            let (name, colour, dash) = match (beams.len(), columns.len()) {
-                (1, _) => (of_column, place, 0),
-                (_, 1) => (beam.clone(), number, number),
-                _ => (format!("{beam}: {of_column}"), place, number),
-            };
-            lines.push(Line {
-                name,
-                points,
-                bars: None,
-                beside: Vec::new(),
-                style: LineStyle::Dashed { colour, dash },
-            });
+            let (name, style) = line_of(
+                OneOf { name: beam.clone(), number, count: beams.len() },
+                OneOf { name: of_column, number: place, count: columns.len() },
+            );
+            lines.push(Line { name, points, bars: None, beside: Vec::new(), style });
         }
     }
     lines
@@ -161,16 +144,4 @@ fn at_place(column: &str) -> String {
 
 fn length_title(units: &Units) -> String {
     units.length().map_or("length along the beam".into(), |unit| format!("length along the beam [{unit}]"))
-}
-
-/// The title of the vertical axis: the column, or the quantity if all columns show the same one.
-/// Otherwise it is empty, and the legend shows the units.
-fn y_title(columns: &[String], units: &Units) -> String {
-    let place = at_place(&columns[0]);
-    if let [column] = columns {
-        return units.title(column, &place);
-    }
-    let quantity = quantity_of(&place);
-    let is_common = columns.iter().all(|column| quantity_of(&at_place(column)) == quantity);
-    quantity.filter(|_| is_common).map_or(String::new(), |quantity| units.title(quantity, &place))
 }

@@ -81,6 +81,7 @@ fn all(wanted: &SectionArguments) -> Result<(), CommandError> {
         };
         json::section(&report.summary(path, shown, &pictures));
         warnings.extend(scene::section_warning(section, deck));
+        warnings.extend(scene::coarse_stresses(section, deck));
     }
     read.warn(path, warnings)
 }

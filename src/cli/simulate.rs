@@ -5,8 +5,8 @@ use super::console;
 use super::progress::Progress;
 use super::signals;
 use crate::output::{
-    DeckSource, FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, ReachedAccuracy, Record,
-    ResultFolder, Row, RowCounter, Rows, SavedRun, SideColumns, Units, write_envelope, write_profile,
+    DeckSource, Extent, FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, ReachedAccuracy,
+    Record, ResultFolder, Row, RowCounter, Rows, SavedRun, SideColumns, Units, write_envelope, write_profile,
 };
 use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
@@ -121,7 +121,7 @@ pub fn simulate(
     let mut record = None;
     let mut folder = None;
     if let Some(mut results) = watcher.results.take() {
-        let completed = results.complete(scene, result.is_ok());
+        let completed = results.complete(scene, Extent::of(&result));
         if let (Ok(()), Err(error)) = (&result, completed) {
             result = Err(Failure::Io(error.to_string()));
         }
@@ -130,7 +130,7 @@ pub fn simulate(
         let run =
             FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, source, resumed, envelope };
         let mut content = Record::of(scene, run);
-        let (claimed, written) = results.commit(result.is_ok(), &mut content);
+        let (claimed, written) = results.commit(Extent::of(&result), &mut content);
         folder = Some(claimed);
         record = Some(content);
         if let Err(error) = written {
@@ -230,26 +230,26 @@ impl Results {
     }
 
     /// Completes all files but the record. Those that can be written are, whatever fails.
-    fn complete(&mut self, scene: &Scene, is_finished: bool) -> Result<(), OutputError> {
+    fn complete(&mut self, scene: &Scene, run: Extent) -> Result<(), OutputError> {
         let history = self.history.complete();
-        let is_finished = is_finished && history.is_ok();
+        let extent = run.after(&history);
         let modes = self.modes.finish(&self.folder).map(|names| self.names.extend(names));
-        let stresses = self.write_stresses(scene, is_finished && modes.is_ok());
-        let is_finished = is_finished && modes.is_ok() && stresses.is_ok();
+        let stresses = self.write_stresses(scene, extent.after(&modes));
+        let extent = extent.after(&modes).after(&stresses);
         let fields = self
             .fields
             .take()
-            .map_or(Ok(()), |fields| fields.finish(&self.folder, is_finished).map(|name| self.names.push(name)));
+            .map_or(Ok(()), |fields| fields.finish(&self.folder, extent).map(|name| self.names.push(name)));
         history.and(modes).and(stresses).and(fields)
     }
 
     /// Writes the tables of stresses and resultants along beams, where they are wanted.
-    fn write_stresses(&mut self, scene: &Scene, is_finished: bool) -> Result<(), OutputError> {
+    fn write_stresses(&mut self, scene: &Scene, extent: Extent) -> Result<(), OutputError> {
         if let Some(envelope) = &self.envelope {
-            self.names.push(write_envelope(&self.folder, &scene.mesh, envelope, is_finished)?);
+            self.names.push(write_envelope(&self.folder, &scene.mesh, envelope, extent)?);
         }
         if let Some(profile) = &self.profile {
-            self.names.push(write_profile(&self.folder, &scene.mesh, profile, is_finished)?);
+            self.names.push(write_profile(&self.folder, &scene.mesh, profile, extent)?);
         }
         Ok(())
     }
@@ -260,9 +260,9 @@ impl Results {
     }
 
     /// Gives all results their names, and returns the folder, which is still claimed.
-    fn commit(self, is_finished: bool, record: &mut Record) -> (ResultFolder, Result<(), OutputError>) {
+    fn commit(self, extent: Extent, record: &mut Record) -> (ResultFolder, Result<(), OutputError>) {
         let Self { folder, history, mut names, .. } = self;
-        let named = history.close(&folder, is_finished).and_then(|name| {
+        let named = history.close(&folder, extent).and_then(|name| {
             names.push(name);
             folder.commit(&names, record)
         });

@@ -7,12 +7,16 @@ use super::yaml::{Node, Yaml};
 use crate::scene::NaturalSpline;
 use beamsim_core::tensor::Vec3;
 use nalgebra::Matrix6;
+use std::rc::Rc;
 
 /// Entries of the upper triangle of a 6x6 matrix
 const ENTRIES: usize = 21;
 
 /// Fractions of the length that are one place
 const ONE_PLACE: f64 = 1e-9;
+
+/// Keys that are not read and that a note names, at most
+const MOST_NAMED: usize = 12;
 
 /// Where a blade has its matrices.
 const PLACE: [&str; 4] = ["components", "blade", "elastic_properties_mb", "six_x_six"];
@@ -23,12 +27,12 @@ struct Course {
     values: Vec<f64>,
 }
 
-/// Matrices over the fraction of the length, in the order of sections here, with their lines in the
+/// Matrices over the fraction of the length, in the order of sections here, with their nodes in the
 /// file.
-struct Matrices {
+struct Matrices<'y> {
     grid: Vec<f64>,
     values: Vec<Matrix6<f64>>,
-    lines: Vec<usize>,
+    rows: &'y [Rc<Node>],
 }
 
 /// Reads the blade of a turbine.
@@ -50,6 +54,7 @@ pub fn read_windio(name: &str, text: &str) -> Result<Blade, ImportError> {
     let stiffness = matrices(&yaml, six, "stiff_matrix")?;
     let mass = matrices(&yaml, six, "inertia_matrix")?;
     let title = yaml.root().get("name").and_then(Node::text).unwrap_or("A blade of windIO");
+    let stations = stations(&yaml, &stiffness, &mass)?;
     Ok(Blade {
         title: title.into(),
         origin: Origin::WindIo,
@@ -57,11 +62,22 @@ pub fn read_windio(name: &str, text: &str) -> Result<Blade, ImportError> {
         file: name.into(),
         member_ends: vec![0, key_points.len() - 1],
         key_points,
-        stations: stations(&yaml, six, &stiffness, &mass)?,
+        stations,
         mu: None,
         rho_inf: 0.0,
-        notes: Vec::new(),
+        notes: not_read(&yaml).into_iter().collect(),
     })
+}
+
+/// A note about keys that were not read.
+fn not_read(yaml: &Yaml) -> Option<String> {
+    let keys = yaml.unread();
+    let named = keys.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join(", ");
+    let more = match keys.len().saturating_sub(MOST_NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!keys.is_empty()).then(|| format!("not read: {named}{more}"))
 }
 
 /// Values with their grid, which increases from 0 to 1.
@@ -124,7 +140,7 @@ fn union<'g>(grids: impl Iterator<Item = &'g [f64]>) -> Vec<f64> {
     all
 }
 
-fn matrices(yaml: &Yaml, six: &Node, key: &str) -> Result<Matrices, ImportError> {
+fn matrices<'y>(yaml: &Yaml, six: &'y Node, key: &str) -> Result<Matrices<'y>, ImportError> {
     let node = yaml.need(six, key)?;
     let grid = grid(yaml, node, &format!("`{key}`"))?;
     let at = yaml.need(node, "values")?;
@@ -143,7 +159,7 @@ fn matrices(yaml: &Yaml, six: &Node, key: &str) -> Result<Matrices, ImportError>
         }
         values.push(Matrix6::from_fn(|i, j| entries[in_triangle(ORDER[i], ORDER[j])]));
     }
-    Ok(Matrices { grid, values, lines: rows.iter().map(|row| row.line()).collect() })
+    Ok(Matrices { grid, values, rows })
 }
 
 /// Number of an entry in the upper triangle by rows.
@@ -152,37 +168,37 @@ fn in_triangle(i: usize, j: usize) -> usize {
     6 * row - row * (row + 1) / 2 + column
 }
 
-impl Matrices {
-    /// The matrix at a place, linear between those of the grid, and the line of the one before.
-    fn at(&self, place: f64) -> (Matrix6<f64>, usize) {
+impl Matrices<'_> {
+    /// The matrix at a place, linear between those of the grid, and the node of the one before.
+    fn at(&self, place: f64) -> (Matrix6<f64>, &Node) {
         let next = self.grid.partition_point(|&known| known <= place + ONE_PLACE).clamp(1, self.grid.len() - 1);
         let part = (place - self.grid[next - 1]) / (self.grid[next] - self.grid[next - 1]);
         let [from, to] = [&self.values[next - 1], &self.values[next]];
         if part.abs() <= ONE_PLACE {
-            (*from, self.lines[next - 1])
+            (*from, &self.rows[next - 1])
         } else if (part - 1.0).abs() <= ONE_PLACE {
-            (*to, self.lines[next])
+            (*to, &self.rows[next])
         } else {
-            (from + (to - from) * part, self.lines[next - 1])
+            (from + (to - from) * part, &self.rows[next - 1])
         }
     }
 }
 
-fn stations(yaml: &Yaml, six: &Node, stiffness: &Matrices, mass: &Matrices) -> Result<Vec<BladeStation>, ImportError> {
+fn stations(yaml: &Yaml, stiffness: &Matrices, mass: &Matrices) -> Result<Vec<BladeStation>, ImportError> {
     let station = |&eta: &f64| {
-        let (stiffness, line) = stiffness.at(eta);
-        let (mass, _) = mass.at(eta);
-        let wrong = |why: String| yaml.error(six, format!("the {why} (at {eta}, line {line})"));
+        let (stiffness, row) = stiffness.at(eta);
+        let (mass, mass_row) = mass.at(eta);
+        let wrong = |row: &Node, why: String| yaml.error(row, format!("the {why} (at {eta})"));
         if stiffness[(1, 1)] == 0.0 || stiffness[(2, 2)] == 0.0 {
             let why = "shear stiffness of a station is zero, as in files of PreComp: give its entries 1 and 7, or import the \
                        BeamDyn files of the blade";
-            return Err(wrong(why.into()));
+            return Err(wrong(row, why.into()));
         }
         if stiffness.cholesky().is_none() {
-            return Err(wrong("stiffness of a station is not positive definite".into()));
+            return Err(wrong(row, "stiffness of a station is not positive definite".into()));
         }
-        let mass = rigid(&mass).map_err(|why| wrong(format!("mass of a station {why}")))?;
-        Ok(BladeStation { eta, stiffness, mass, line })
+        let mass = rigid(&mass).map_err(|why| wrong(mass_row, format!("mass of a station {why}")))?;
+        Ok(BladeStation { eta, stiffness, mass, line: row.line() })
     };
     union([&stiffness.grid[..], &mass.grid[..]].into_iter()).iter().map(station).collect()
 }

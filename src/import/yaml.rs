@@ -3,6 +3,7 @@
 
 use super::lines::ImportError;
 use saphyr_parser::{Event, Parser, ScanError, Span};
+use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
@@ -23,7 +24,18 @@ pub struct Node {
 enum Value {
     Scalar(String),
     List(Vec<Rc<Node>>),
-    Map(Vec<(String, Rc<Node>)>),
+    Map(Vec<Entry>),
+}
+
+/// A key of a map with its value.
+#[derive(Debug)]
+struct Entry {
+    key: String,
+    /// Line and column of the key
+    at: [usize; 2],
+    node: Rc<Node>,
+    /// True once the value was asked for
+    is_read: Cell<bool>,
 }
 
 /// A list or map whose end has not come yet.
@@ -31,8 +43,8 @@ struct Open {
     anchor: usize,
     at: [usize; 2],
     value: Value,
-    /// The key whose value comes next
-    key: Option<String>,
+    /// The key whose value comes next, with its place
+    key: Option<(String, [usize; 2])>,
     /// All keys so far
     keys: HashSet<String>,
     /// The depth of the deepest node in it
@@ -66,6 +78,13 @@ impl<'t> Yaml<'t> {
     /// An error at a node.
     pub fn error(&self, at: &Node, message: impl Into<String>) -> ImportError {
         ImportError { file: self.file.into(), at: Some(at.at), message: message.into() }
+    }
+
+    /// Keys that nobody asked for, in maps that were read, each with its path and line.
+    pub fn unread(&self) -> Vec<String> {
+        let mut found = Vec::new();
+        self.root.unread("", &mut found);
+        found
     }
 
     /// The node at the end of a path of keys, if all of them are there.
@@ -109,8 +128,23 @@ impl Node {
     /// The value of a key, if this is a map that has it.
     pub fn get(&self, key: &str) -> Option<&Node> {
         match &self.value {
-            Value::Map(entries) => entries.iter().find(|(known, _)| known == key).map(|(_, node)| &**node),
+            Value::Map(entries) => {
+                let entry = entries.iter().find(|entry| entry.key == key)?;
+                entry.is_read.set(true);
+                Some(&entry.node)
+            }
             Value::Scalar(_) | Value::List(_) => None,
+        }
+    }
+
+    fn unread(&self, path: &str, found: &mut Vec<String>) {
+        let Value::Map(entries) = &self.value else { return };
+        for Entry { key, at, node, is_read } in entries {
+            if is_read.get() {
+                node.unread(&format!("{path}{key}."), found);
+            } else {
+                found.push(format!("`{path}{key}` (line {})", at[0]));
+            }
         }
     }
 
@@ -181,7 +215,7 @@ impl Tree<'_> {
         match value {
             Value::List(items) => items.push(node),
             Value::Map(entries) => match key.take() {
-                Some(key) => entries.push((key, node)),
+                Some((key, at)) => entries.push(Entry { key, at, node, is_read: Cell::new(false) }),
                 None => {
                     let name = node.text().map(str::to_string);
                     let Some(name) = name else { return Err(self.error(node.at, "a key must be a word")) };
@@ -191,7 +225,7 @@ impl Tree<'_> {
                     if !keys.insert(name.clone()) {
                         return Err(self.error(node.at, &format!("the key `{name}` is given twice")));
                     }
-                    *key = Some(name);
+                    *key = Some((name, node.at));
                 }
             },
             Value::Scalar(_) => {}

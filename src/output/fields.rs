@@ -5,7 +5,8 @@
 //! XML as raw bytes ("appended").
 
 use super::files::{FIELDS, PARTIAL_FIELDS};
-use super::{OutputError, ResultFolder, Row};
+use super::folder::INDICES;
+use super::{Extent, OutputError, ResultFolder, Row};
 use beamsim_core::probe::{Figure, Look};
 use beamsim_core::run::{Moment, Snapshot};
 use beamsim_core::system::State;
@@ -122,12 +123,12 @@ impl FieldsWriter {
 
     /// Completes the fields, and returns the name of their index: `fields.pvd`, or
     /// `fields.partial.pvd` where the run failed.
-    pub fn finish(mut self, folder: &ResultFolder, finished: bool) -> Result<&'static str, OutputError> {
+    pub fn finish(mut self, folder: &ResultFolder, extent: Extent) -> Result<&'static str, OutputError> {
         if let Some(PendingRow { moment, state, origin }) = self.pending.take() {
             self.write(moment, &state, origin.as_ref())?;
         }
         self.save()?;
-        let (name, index_name) = if finished { (FIELDS, "fields.pvd") } else { (PARTIAL_FIELDS, "fields.partial.pvd") };
+        let [name, index_name] = [[FIELDS, PARTIAL_FIELDS], INDICES].map(|names| extent.name(names));
         folder.write(index_name, index(name, &self.written).as_bytes())?;
         Ok(index_name)
     }

@@ -19,14 +19,16 @@ const LOCK: &str = ".lock";
 const RECORD: &str = "run.json";
 /// The file of a run that can be resumed.
 pub const CHECKPOINT: &str = "checkpoint";
-/// The table of largest stresses of a run that finished, and of one that did not.
-const STRESS: [&str; 2] = ["stress.csv", "stress.partial.csv"];
-/// The table of resultants along beams of a run that finished, and of one that did not.
-const PROFILE: [&str; 2] = ["profile.csv", "profile.partial.csv"];
+/// Names of a history, by its extent.
+pub const HISTORY: [&str; 2] = ["history.csv", "history.partial.csv"];
+/// Names of the table of largest stresses, by its extent.
+pub const STRESS: [&str; 2] = ["stress.csv", "stress.partial.csv"];
+/// Names of the table of resultants along beams, by its extent.
+pub const PROFILE: [&str; 2] = ["profile.csv", "profile.partial.csv"];
 /// The tables that a run may write, and their kinds.
 const TABLES: [(&str, OutputKind); 8] = [
-    ("history.csv", OutputKind::History),
-    ("history.partial.csv", OutputKind::History),
+    (HISTORY[0], OutputKind::History),
+    (HISTORY[1], OutputKind::History),
     ("modes.csv", OutputKind::Modes),
     ("buckling.csv", OutputKind::Buckling),
     (STRESS[0], OutputKind::Stress),
@@ -34,20 +36,44 @@ const TABLES: [(&str, OutputKind); 8] = [
     (PROFILE[0], OutputKind::Profile),
     (PROFILE[1], OutputKind::Profile),
 ];
-/// Name of the table of largest stresses.
-pub fn stress_name(is_finished: bool) -> &'static str {
-    STRESS[usize::from(!is_finished)]
-}
-/// Name of the table of resultants along beams.
-pub fn profile_name(is_finished: bool) -> &'static str {
-    PROFILE[usize::from(!is_finished)]
-}
 /// The names of tables.
 fn tables() -> impl Iterator<Item = &'static str> {
     TABLES.into_iter().map(|(name, _)| name)
 }
-/// The indices of fields.
-const INDICES: [&str; 2] = ["fields.pvd", "fields.partial.pvd"];
+/// Names of the index of fields, by its extent.
+pub const INDICES: [&str; 2] = ["fields.pvd", "fields.partial.pvd"];
+
+/// How far the results of a run go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// The run finished, and all results so far could be written
+    Whole,
+    /// The run did not finish, or a result could not be written
+    Partial,
+}
+
+impl Extent {
+    /// Whole if a run or the writing of a result succeeded.
+    pub fn of<T, E>(result: &Result<T, E>) -> Self {
+        if result.is_ok() { Self::Whole } else { Self::Partial }
+    }
+
+    /// The extent after the next result was written.
+    pub fn after<T, E>(self, result: &Result<T, E>) -> Self {
+        match self {
+            Self::Whole => Self::of(result),
+            Self::Partial => Self::Partial,
+        }
+    }
+
+    /// The name of a file among those of both extents.
+    pub fn name(self, [whole, partial]: [&'static str; 2]) -> &'static str {
+        match self {
+            Self::Whole => whole,
+            Self::Partial => partial,
+        }
+    }
+}
 
 /// The name of a file that is not complete.
 fn part(name: &str) -> String {

@@ -1,6 +1,6 @@
 //! history.csv: one row per load level or time step, one column per number.
 
-use super::{OutputError, Record, ResultFolder, settle};
+use super::{Extent, OutputError, Record, ResultFolder, folder, settle};
 use beamsim_core::probe::clocks;
 use beamsim_core::run::Moment;
 use serde::{Deserialize, Serialize};
@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 use xxhash_rust::xxh3::Xxh3;
 
 /// The name of the history of a run that finished.
-const HISTORY: &str = "history.csv";
+const HISTORY: &str = folder::HISTORY[0];
 /// The name of the history of a run that did not.
-const PARTIAL_HISTORY: &str = "history.partial.csv";
+const PARTIAL_HISTORY: &str = folder::HISTORY[1];
 /// Bytes of a file that are read at once
 const READ_AT_ONCE: usize = 1 << 16;
 /// Bytes that a row has at most
@@ -304,17 +304,19 @@ impl HistoryWriter {
         Ok(self.writer.get_ref().file.sync_all()?)
     }
 
-    /// Closes the file, and returns the name that it is to get: `history.csv` if the run finished,
-    /// else `history.partial.csv`. Half a row, where the disk was full, is removed.
-    pub fn close(self, folder: &ResultFolder, finished: bool) -> Result<&'static str, OutputError> {
-        if finished {
-            return Ok(HISTORY);
+    /// Closes the file, and returns the name that it is to get. Half a row, where the disk was full, is
+    /// removed.
+    pub fn close(self, folder: &ResultFolder, extent: Extent) -> Result<&'static str, OutputError> {
+        match extent {
+            Extent::Whole => {}
+            Extent::Partial => {
+                drop(self.writer);
+                let path = folder.part(HISTORY);
+                keep_whole_rows(&path).map_err(|error| OutputError::file(&path, error))?;
+                folder.rename_part(HISTORY, PARTIAL_HISTORY)?;
+            }
         }
-        drop(self.writer);
-        let path = folder.part(HISTORY);
-        keep_whole_rows(&path).map_err(|error| OutputError::file(&path, error))?;
-        folder.rename_part(HISTORY, PARTIAL_HISTORY)?;
-        Ok(PARTIAL_HISTORY)
+        Ok(extent.name(folder::HISTORY))
     }
 }
 

@@ -23,7 +23,7 @@ pub use checkpoint::{FoundCheckpoint, SavedRun};
 pub use error::OutputError;
 pub use fields::{FieldsWriter, SavedFields};
 pub use files::{PartFile, remove_dead_parts, remove_fields, remove_if_there};
-pub use folder::{ResultFolder, settle};
+pub use folder::{Extent, ResultFolder, settle};
 pub use history::{
     HistoryReader, HistoryWriter, Row, RowCounter, Rows, SavedBars, SavedCompanion, SavedHistory, SideColumns,
 };

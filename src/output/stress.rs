@@ -2,8 +2,8 @@
 //! along all beams at the end of each stage.
 
 use super::cells::harmless;
-use super::folder::{profile_name, stress_name};
-use super::{OutputError, ResultFolder};
+use super::folder::{PROFILE, STRESS};
+use super::{Extent, OutputError, ResultFolder};
 use crate::scene::Mesh;
 use beamsim_core::probe::{BeamPoint, Envelope, Extreme, Extremes, Profile, ProfilePlace, StageEnd, StressPlace};
 use beamsim_core::section::Vector6;
@@ -23,7 +23,7 @@ pub fn write_envelope(
     folder: &ResultFolder,
     mesh: &Mesh,
     envelope: &Envelope,
-    is_finished: bool,
+    extent: Extent,
 ) -> Result<&'static str, OutputError> {
     let mut header: Vec<String> = PLACE.iter().chain(&["section", "vm"]).map(ToString::to_string).collect();
     header.extend(EXTREME.map(String::from));
@@ -43,7 +43,7 @@ pub fn write_envelope(
         cells
     };
     let rows = envelope.places().iter().zip(&found).map(row);
-    write(folder, stress_name(is_finished), &header, rows)
+    write(folder, extent.name(STRESS), &header, rows)
 }
 
 /// Writes the table of resultants of a run, as far as it came; gives its name.
@@ -51,7 +51,7 @@ pub fn write_profile(
     folder: &ResultFolder,
     mesh: &Mesh,
     profile: &Profile,
-    is_finished: bool,
+    extent: Extent,
 ) -> Result<&'static str, OutputError> {
     let known = || profile.places().iter().filter_map(|place| place.section.as_ref());
     let has_stress = known().next().is_some();
@@ -80,7 +80,7 @@ pub fn write_profile(
     let rows = profile.ends().iter().flat_map(|end| {
         profile.places().iter().zip(&end.resultants).map(|(place, resultants)| row(end, place, resultants))
     });
-    write(folder, profile_name(is_finished), &header, rows)
+    write(folder, extent.name(PROFILE), &header, rows)
 }
 
 fn write<H: AsRef<[u8]>>(

@@ -1,7 +1,8 @@
 //! Memory that a scene will take, compared with what there is before any of it is taken: a failed
 //! allocation would end the program without a word.
 
-use crate::deck::{self, Deck, Diagnostic, StageBody};
+use crate::deck::{self, Deck, Diagnostic, StageBody, Strength};
+use beamsim_core::probe::LargestRow;
 use std::fs;
 use std::path::Path;
 
@@ -17,6 +18,9 @@ const NODE_BYTES_IN_MODES: f64 = 10_000.0;
 
 /// Additional bytes that a node takes for each mode that is asked for, measured likewise.
 const NODE_BYTES_OF_A_MODE: f64 = 320.0;
+
+/// Additional bytes that a node takes for each largest value that is followed there: rows that wait.
+const NODE_BYTES_IN_ENVELOPE: f64 = LargestRow::WAITING_BYTES as f64;
 
 /// The part of a limited address space that data can fill: allocators and threads reserve the rest.
 const USABLE_SHARE: f64 = 0.85;
@@ -41,7 +45,8 @@ pub fn check(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         room.bound
     );
     let fitting = fitting(nodes * room.bytes / bytes);
-    let help = format!("about {fitting:.0} nodes would fit: take fewer `elements`");
+    let or_less = if deck.output.envelope.is_some() { ", or leave out `envelope`" } else { "" };
+    let help = format!("about {fitting:.0} nodes would fit: take fewer `elements`{or_less}");
     diagnostics.push(Diagnostic::limit(message, largest.elements.span.clone()).help(help));
 }
 
@@ -69,13 +74,28 @@ fn need(deck: &Deck) -> MemoryNeed {
         StageBody::Buckling { modes } => NODE_BYTES_OF_A_MODE * modes as f64,
     };
     let of_stages = deck.stages.iter().map(of_stage).fold(0.0, f64::max);
+    let of_envelope = NODE_BYTES_IN_ENVELOPE * followed(deck) as f64;
     let mut need = MemoryNeed { bytes: 0.0, nodes: 0.0 };
     for beam in &deck.beams {
         let nodes = nodes_of(beam);
         need.nodes += nodes;
-        need.bytes += nodes * (NODE_BYTES[beam.order.clamp(1, 3) - 1] + of_stages);
+        need.bytes += nodes * (NODE_BYTES[beam.order.clamp(1, 3) - 1] + of_stages + of_envelope);
     }
     need
+}
+
+/// The number of largest values that an envelope follows at a place, at most: von Mises stress, and a
+/// failure index that is not von Mises stress over a strength.
+fn followed(deck: &Deck) -> usize {
+    if deck.output.envelope.is_none() {
+        return 0;
+    }
+    let has_own_index = |material: &deck::Material| match &material.strength {
+        Some(Strength::Ply { .. }) => true,
+        Some(Strength::Yield(_)) => material.strain_limit.is_some() || deck.materials.len() > 1,
+        None => material.strain_limit.is_some(),
+    };
+    1 + usize::from(deck.materials.iter().any(has_own_index))
 }
 
 /// The number of nodes of a beam; a number that no integer holds is possible here.
@@ -196,6 +216,27 @@ mod tests {
         assert_eq!(own.bytes, USABLE_SHARE * (1_024_000.0 - 512_000.0));
         assert_eq!(process_room(&limits.replace("1024000", "unlimited"), "VmSize: 1 kB\n"), None);
         assert_eq!(machine_room(""), None);
+    }
+
+    #[test]
+    fn envelopes_need_room_for_rows_that_wait() {
+        let deck = |material: &str, envelope: bool| {
+            format!(
+                "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[material.m]\nE = 1\nnu = 0.3\n{material}\n\
+                 [section.s]\nshape = \"circle\"\nradius = 0.1\nmaterial = \"m\"\n\
+                 [[beam]]\nname = \"arm\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 1000\n\
+                 [[stage]]\nkind = \"static\"\n[output]\nenvelope = {envelope}\n"
+            )
+        };
+        let bytes = |material: &str, envelope: bool| {
+            let (read, _) = deck::read(&deck(material, envelope)).expect("a deck");
+            need(&read).bytes
+        };
+        let none = bytes("", false);
+        for (material, values) in [("", 1.0), ("strength = 1", 1.0), ("strain_limit = 0.1", 2.0)] {
+            let more = bytes(material, true) - none;
+            assert_eq!(more, values * 1000.0 * 128.0 * 88.0, "{material}");
+        }
     }
 
     #[test]

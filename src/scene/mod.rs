@@ -29,7 +29,7 @@ pub use curve::{NaturalSpline, Spline};
 pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
 pub use section::matrices as section_matrices;
-pub use stress::recovery as section_stresses;
+pub use stress::{coarse_stresses, recovery as section_stresses};
 
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, Severity, Spanned, StageBody, Target, Words, words,
@@ -45,7 +45,6 @@ use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
 use constraints::SceneConstraints;
-use figure::SectionsAtNodes;
 use output::Columns;
 use std::sync::Arc;
 use stress::SectionStresses;
@@ -84,15 +83,17 @@ pub struct Scene {
     elasticity: Vec<Arc<dyn StressField>>,
     /// Surfaces and contacts, for pictures
     contacts: Option<Arc<SurfaceContacts>>,
-    /// Sections whose stresses fields show; empty where no stresses are wanted
-    sections_at_nodes: SectionsAtNodes,
+    /// The deck, if pictures show the stresses of its sections
+    stress_deck: Option<Arc<Deck>>,
 }
 
 impl Scene {
     /// Its whole shape, for pictures.
     pub fn figure(&self) -> Figure {
         let contacts = self.contacts.clone();
-        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity, &self.sections_at_nodes, contacts)
+        // Sections at all nodes are prepared for pictures alone: most runs have none.
+        let sections = self.stress_deck.as_ref().map(|deck| SectionStresses::new(deck).at_nodes(&self.mesh));
+        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity, &sections.unwrap_or_default(), contacts)
     }
 
     /// All texts of the deck that may name a place on a beam.
@@ -308,9 +309,10 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let probes = columns.written(&mut found);
     let envelope = deck.output.envelope.as_ref().map(|span| columns.stress_places(span, &mut found));
     let profile = deck.output.profile.as_ref().map(|span| columns.profile_places(span));
-    let sections_at_nodes = if shows_stress(deck) { columns.sections_at_nodes() } else { Vec::new() };
+    let stress_deck = shows_stress(deck).then(|| Arc::new(deck.clone()));
     let stages = stages(deck, &columns, &mut found);
     let expectations = expectations(deck, &columns, &mut found);
+    diagnostics.extend(stresses.warnings());
     let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
     // Where a beam could not be meshed, points may seem to be no nodes: only errors about unknown
     // names are kept.
@@ -365,7 +367,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
         contacts: composition.contacts,
-        sections_at_nodes,
+        stress_deck,
     })
 }
 

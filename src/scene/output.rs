@@ -1,8 +1,7 @@
 //! The columns that a deck writes or watches, found by name and bound to nodes, beams and the
 //! scene.
 
-use super::figure::SectionsAtNodes;
-use super::mesh::{Mesh, MeshBeam};
+use super::mesh::Mesh;
 use super::names::{Found, unknown};
 use super::stress::SectionStresses;
 use crate::deck::{Contact, Deck, Diagnostic, ExpectBody, Span, Spanned, hint, nearest, one_of};
@@ -218,15 +217,6 @@ impl Columns<'_> {
             self.fractions(number).into_iter().map(place)
         };
         (0..self.mesh.beams.len()).flat_map(of_beam).collect()
-    }
-
-    /// Stresses of the sections at the nodes of each beam, where they are known.
-    pub fn sections_at_nodes(&self) -> SectionsAtNodes {
-        let of_beam = |beam: &MeshBeam| {
-            let section = |&fraction: &f64| self.stresses.at(&beam.name, fraction, &(0..0)).ok();
-            beam.fractions.iter().map(section).collect()
-        };
-        self.mesh.beams.iter().map(of_beam).collect()
     }
 
     /// Fractions of the length of the nodes and the stations of a beam.

@@ -1,6 +1,8 @@
 //! Stresses of the sections of a deck at places on its beams.
 
 use super::computed::{self, Solution, SolvedSection};
+use super::figure::SectionsAtNodes;
+use super::mesh::{Mesh, MeshBeam};
 use super::section::{blend_shapes, find_material};
 use super::{names, path};
 use crate::deck::{
@@ -13,6 +15,7 @@ use beamsim_core::section::mesh::Region;
 use beamsim_core::section::recovery::{PlacedRecovery, Placement, PointStress, Recovery};
 use beamsim_core::section::strength::{FailureLaw, Strengths};
 use beamsim_core::section::stress::Corners;
+use beamsim_core::warning::WarningKind;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -90,6 +93,15 @@ impl<'d> SectionStresses<'d> {
         self.beam(beam, &(0..0)).map_or(Vec::new(), stations)
     }
 
+    /// The sections at the nodes of each beam of a mesh, where their stresses are known.
+    pub fn at_nodes(&self, mesh: &Mesh) -> SectionsAtNodes {
+        let of_beam = |beam: &MeshBeam| {
+            let section = |&fraction: &f64| self.at(&beam.name, fraction, &(0..0)).ok();
+            beam.fractions.iter().map(section).collect()
+        };
+        mesh.beams.iter().map(of_beam).collect()
+    }
+
     fn beam(&self, name: &str, span: &Span) -> Result<&'d Beam, Diagnostic> {
         let known = self.deck.beams.iter().find(|known| known.name.value == name);
         known.ok_or_else(|| Diagnostic::error(format!("there is no beam `{name}`"), span.clone()))
@@ -113,6 +125,12 @@ impl<'d> SectionStresses<'d> {
         }
         let along = (fraction - stations[start]) / (stations[end] - stations[start]);
         Ok(Found::Between([section(start)?, section(end)?], along.clamp(0.0, 1.0)))
+    }
+
+    /// Warnings of sections whose stresses are those of a coarser mesh than was aimed at.
+    pub fn warnings(&self) -> Vec<Diagnostic> {
+        let is_made = |section: &&deck::Section| self.made.borrow().contains_key(&section.name.value);
+        self.deck.sections.iter().filter(is_made).filter_map(|section| coarse_stresses(section, self.deck)).collect()
     }
 
     fn of_section(&self, section: &deck::Section, span: &Span) -> Result<Arc<Recovery>, Diagnostic> {
@@ -160,6 +178,19 @@ impl<'d> SectionStresses<'d> {
         let help = format!("ask for it where the section is one of the deck: {}", stations.join(", "));
         Err(Diagnostic::error(message, span.clone()).help(help))
     }
+}
+
+/// A warning about a section whose stresses are those of a coarser mesh than was aimed at.
+pub fn coarse_stresses(section: &deck::Section, deck: &Deck) -> Option<Diagnostic> {
+    let Solution { analysis, materials, .. } = computed::solved(section, deck)?.ok()?.solution?;
+    let error = analysis.stresses(&materials).ok()?.coarse.as_ref()?;
+    let name = &section.name;
+    let message = format!(
+        "stresses of section `{}` are those of the coarse mesh of its stiffness: the finer one failed ({error})",
+        name.value
+    );
+    let help = "give the mesh by `mesh = { size = … }`, and compare two sizes";
+    Some(Diagnostic::warning(WarningKind::CoarseSection, message, name.span.clone()).help(help))
 }
 
 /// Stresses at a point of a section of the deck.

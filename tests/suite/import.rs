@@ -269,11 +269,11 @@ fn wrong_turbines_are_refused_at_their_place() {
         (
             "-  [972948000.0, ",
             "-  [-972948000.0, ",
-            "the stiffness of a station is not positive definite (at 0, line 27)",
+            "t.yaml:27:27: the stiffness of a station is not positive definite (at 0)",
         ),
         ("-  [972948000.0, ", "-  [0.0, ", "the shear stiffness of a station is zero, as in files of PreComp"),
         ("-  [972948000.0, ", "-  [1e9l, ", "a matrix of `stiff_matrix` must be numbers"),
-        ("-  [678.935, ", "-  [700.0, ", "mass of a station differs by direction"),
+        ("-  [678.935, ", "-  [700.0, ", "t.yaml:53:27: the mass of a station differs by direction"),
         ("&span [0.0, ", "&span [0.1, ", "`grid` of `z` of the reference axis must increase from 0 to 1"),
         ("grid: [0.0, 1.0]", "grid: [0.0, 0.5, 1.0]", "`x` of the reference axis has 2 values and 3 places in `grid`"),
         ("*axis", "*axes", "t.yaml:22:33: this is no YAML"),
@@ -290,6 +290,19 @@ fn wrong_turbines_are_refused_at_their_place() {
     for end in (0..text.len()).step_by(997).filter(|&end| text.is_char_boundary(end)) {
         let _ = windio(&text[..end]);
     }
+}
+
+/// A note lists the keys that the import has no use for.
+#[test]
+fn keys_that_are_not_read_are_told() {
+    let text = text("nrel_5mw_windio.yaml");
+    let notes = |text: &str| blade_deck(&read_windio("t.yaml", text).unwrap(), None).notes;
+    assert_eq!(notes(&text), ["not read: `components.blade.outer_shape_bem` (line 6)"]);
+    let more = text.replacen("six_x_six:\n", "six_x_six:\n                viscosity: [1]\n", 1) + "assembly: {}\n";
+    let told = notes(&more);
+    let expected = "not read: `components.blade.outer_shape_bem` (line 6), \
+                    `components.blade.elastic_properties_mb.six_x_six.viscosity` (line 22), `assembly` (line";
+    assert!(told.len() == 1 && told[0].starts_with(expected), "{told:?}");
 }
 
 /// Files that end anywhere, or have lost any line, are refused or read, without a panic.

@@ -279,6 +279,17 @@ fn a_profile_is_a_diagram_over_the_length_of_beams() {
         let (ended, text) = told(words);
         assert!(ended == 2 && text.contains(expected), "{ended} {text}");
     }
+    // The profile of a run that did not finish says so, as a history does.
+    let more = "[[load]]\nat = \"c\"\nforce = [0, 0, 20]\nstages = [2]\n[[stage]]\nkind = \"static\"\nsteps = 2\n";
+    folder.write("more.toml", &BEAMS.replacen("[[stage]]\nkind = \"static\"\nsteps = 2\n", more, 1));
+    let tight = ["--set", "stage.1.max_iterations=1", "--set", "stage.1.adaptive=false"];
+    assert_eq!(status(&folder.beamsim(&[&["run", "more.toml", "--out", "f"], &tight[..]].concat())), 3);
+    let output = folder.beamsim(&["plot", "f/profile.partial.csv"]);
+    assert_eq!(status(&output), 0);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(text.contains("the run did not finish (not_converged); its profile ends there"), "{text}");
+    let picture = fs::read_to_string(folder.0.join("f/profile.partial.svg")).unwrap();
+    assert!(picture.contains("(did not finish: not_converged)"), "{picture}");
     let output = folder.beamsim(&["plot", "r", "--beam", "first"]);
     assert!(last_line(&output).contains("`--beam` is for profiles along beams"), "{}", last_line(&output));
 }

@@ -1,9 +1,9 @@
 //! The largest stresses over the time of a run, at places along beams.
 
 use super::largest_row::{Extreme, LargestRow, Row};
-use super::place::StressPlace;
+use super::place::{LastElement, StressPlace};
 use crate::run::Snapshot;
-use crate::section::recovery::Criterion;
+use crate::section::recovery::{Criterion, PlacedRecovery};
 use serde::{Deserialize, Serialize};
 
 /// The largest stresses so far.
@@ -17,6 +17,11 @@ pub struct Envelope {
 pub struct Followed {
     von_mises: LargestRow,
     index: LargestRow,
+}
+
+/// True if the largest failure index does not follow from the largest von Mises stress.
+fn has_own_index(section: &PlacedRecovery) -> bool {
+    section.section().has_strength() && section.section().yield_stress_alone().is_none()
 }
 
 /// The largest stresses of a place.
@@ -56,7 +61,12 @@ impl Envelope {
     pub fn found(&self) -> Vec<Extremes> {
         let of_place = |(place, followed): (&StressPlace, &Followed)| Extremes {
             von_mises: followed.von_mises.found(&place.section, Criterion::VonMises),
-            index: followed.index.found(&place.section, Criterion::FailureIndex),
+            index: match place.section.section().yield_stress_alone() {
+                Some(limit) => {
+                    followed.von_mises.found(&place.section, Criterion::VonMises).map(|found| found.over(limit))
+                }
+                None => followed.index.found(&place.section, Criterion::FailureIndex),
+            },
         };
         self.places.iter().zip(&self.followed).map(of_place).collect()
     }
@@ -64,10 +74,11 @@ impl Envelope {
     /// Takes a converged state.
     pub fn row(&mut self, at: &Snapshot) {
         let moment = at.moment();
+        let mut last = LastElement::default();
         for (place, Followed { von_mises, index }) in self.places.iter().zip(&mut self.followed) {
-            let resultant = place.inside.strain_and_stress(at.state, at.origin)[1];
+            let resultant = place.inside.strain_and_stress_after(&mut last, at.state, at.origin)[1];
             von_mises.row(&place.section, Criterion::VonMises, Row { moment, resultant });
-            if place.section.section().has_strength() {
+            if has_own_index(&place.section) {
                 index.row(&place.section, Criterion::FailureIndex, Row { moment, resultant });
             }
         }

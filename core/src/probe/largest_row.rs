@@ -3,18 +3,22 @@
 //!
 //! Measures are convex and proportional to the load. So the value of a row is bounded by those of
 //! rows that were looked at: by one of them (a multiple of it, and what is left), and between two of
-//! them by the chord. Rows that may be the largest wait until there is a batch of them. The row that
-//! is likely to be the largest is looked at first, and excludes most others: if stress grows in every
-//! row, nearly all of a batch.
+//! them by the chord. Loads of successive rows are near each other: the last row that was searched
+//! bounds those after it, and its point with the largest value is likely to be theirs. Rows that may
+//! be the largest wait until there is a batch of them. The row that is likely to be the largest is
+//! looked at first, and excludes most others: if stress grows in every row, nearly all of a batch.
 
 use crate::run::Moment;
-use crate::section::recovery::{Criterion, PlacedRecovery};
+use crate::section::recovery::{Criterion, PlacedRecovery, SearchedPoint};
 use crate::section::unit_peaks::UnitPeaks;
 use crate::section::{Point, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// Rows that wait, at most
 const BATCH: usize = 128;
+
+/// The part of the floor down to which values of rows are estimated
+const KNOWN_BELOW: f64 = 0.8;
 
 /// The part of a value that is round-off
 const ROUND_OFF: f64 = 1e-12;
@@ -43,6 +47,25 @@ pub struct LargestRow {
     floor: f64,
     /// Number of rows so far
     count: u64,
+    /// The last load whose value was estimated
+    recent: Option<Recent>,
+}
+
+/// A load with an estimate of its value.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+struct Recent {
+    known: Known,
+    /// The point of the section that had the largest value last; none before one was found
+    at: Option<SearchedPoint>,
+}
+
+/// A load with bounds of its value.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+struct Known {
+    /// Resultants of the section
+    load: [f64; 6],
+    least: f64,
+    most: f64,
 }
 
 /// Resultants of the beam in a row.
@@ -77,7 +100,17 @@ struct Search<'a> {
     criterion: Criterion,
 }
 
+impl Extreme {
+    /// The largest value of a measure divided by a number.
+    pub(super) fn over(self, divisor: f64) -> Self {
+        Self { value: self.value / divisor, ..self }
+    }
+}
+
 impl LargestRow {
+    /// Bytes that rows take while they wait, at most.
+    pub const WAITING_BYTES: usize = BATCH * size_of::<Waiting>();
+
     /// Takes the next row.
     pub fn row(&mut self, section: &PlacedRecovery, criterion: Criterion, row: Row) {
         let search = Search { section, criterion };
@@ -88,28 +121,46 @@ impl LargestRow {
             self.floor = self.best.map_or(0.0, |best| best.extreme.value);
             return;
         };
-        let limit = self.limit();
+        // The row that reaches the floor waits already: others that are its equal do not matter.
+        let limit = self.floor * (1.0 + ROUND_OFF);
         let load = search.load(&row.resultant);
         if search.peaks().bound(&load) <= limit {
             return;
         }
-        let [least, most] = search.around(best, &load);
-        if most <= limit {
-            return;
-        }
-        let at_least = if least > self.floor {
-            least
-        } else {
-            match section.section().may_exceed(criterion, &load, self.floor) {
-                None => return,
-                Some(reached) => reached.max(least),
+        let mut at_least = f64::NEG_INFINITY;
+        for known in [Some(search.known(best)), self.recent.map(|recent| recent.known)].into_iter().flatten() {
+            let [least, most] = search.around(&known, &load);
+            if most <= limit {
+                return;
             }
-        };
+            at_least = at_least.max(least);
+        }
+        if at_least <= self.floor {
+            let point = self.recent.and_then(|recent| recent.at);
+            at_least = at_least.max(point.map_or(at_least, |at| search.value_at(at, &load)));
+        }
+        if at_least <= self.floor {
+            match self.estimate(search, &load) {
+                Some(reached) => at_least = at_least.max(reached),
+                None => return,
+            }
+        }
         self.floor = self.floor.max(at_least);
         self.waiting.push(Waiting { number, row, at_least });
         if self.waiting.len() == BATCH {
             self.settle(search);
         }
+    }
+
+    /// A value that a load reaches, if its largest value may be above the floor. The search begins
+    /// below the floor, so that its bounds exclude the rows that follow as long as they are near.
+    fn estimate(&mut self, search: Search, load: &Vector6) -> Option<f64> {
+        let below = KNOWN_BELOW * self.floor;
+        let estimate = search.section.section().estimate(search.criterion, load, below);
+        let [least, most] = estimate.map_or([0.0, below], |found| [found.least, found.most]);
+        let at = estimate.map(|found| found.at).or(self.recent.and_then(|recent| recent.at));
+        self.recent = Some(Recent { known: Known { load: (*load).into(), least, most }, at });
+        estimate.filter(|found| found.most > self.floor).map(|found| found.least)
     }
 
     /// The largest row so far.
@@ -119,7 +170,7 @@ impl LargestRow {
         settled.best.map(|best| best.extreme)
     }
 
-    /// The value that a row must exceed to matter.
+    /// The value that a row that waits must exceed to matter.
     fn limit(&self) -> f64 {
         let best = self.best.map_or(f64::NEG_INFINITY, |best| best.extreme.value);
         (best * (1.0 + ROUND_OFF)).max(self.floor * (1.0 - ROUND_OFF))
@@ -138,7 +189,7 @@ impl LargestRow {
             .iter()
             .filter(|waiting| {
                 let load = &search.load(&waiting.row.resultant);
-                let ends = before.iter().chain(&behind).map(|end| search.around(end, load)[1]);
+                let ends = before.iter().chain(&behind).map(|end| search.around(&search.known(end), load)[1]);
                 let chord = before.zip(behind).map(|(before, behind)| search.chord([&before, &behind], load));
                 // Not `>`: a bound that is not a number must not hide anything.
                 !ends.chain(chord).any(|most| most <= limit)
@@ -180,10 +231,19 @@ impl Search<'_> {
         self.section.section().unit_peaks(self.criterion)
     }
 
-    /// Lower and upper bound of the value of a load by that of a row.
-    fn around(&self, known: &Looked, load: &Vector6) -> [f64; 2] {
-        let Extreme { value, resultant, .. } = known.extreme;
-        self.peaks().around(load, &self.load(&resultant), value)
+    /// The load of a row that was looked at, whose value is known.
+    fn known(&self, Looked { extreme, .. }: &Looked) -> Known {
+        let Extreme { value, resultant, .. } = *extreme;
+        Known { load: self.load(&resultant).into(), least: value, most: value }
+    }
+
+    /// Lower and upper bound of the value of a load by those of another one.
+    fn around(&self, known: &Known, load: &Vector6) -> [f64; 2] {
+        self.peaks().around(load, &Vector6::from(known.load), [known.least, known.most])
+    }
+
+    fn value_at(&self, at: SearchedPoint, load: &Vector6) -> f64 {
+        self.section.section().value_at(self.criterion, at, load)
     }
 
     /// Upper bound of the value of a load by the chord between two rows.
@@ -196,9 +256,14 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::section::analysis::{DEFAULT_AIM, MeshAim, analyse};
     use crate::section::closed::{ClosedForm, ClosedShape};
+    use crate::section::geometry::{Geometry, Profile, Shape};
+    use crate::section::material::Material;
+    use crate::section::mesh::Region;
     use crate::section::recovery::{Placement, Recovery};
     use crate::section::strength::{FailureLaw, Strengths};
+    use crate::section::stress::Corners;
     use std::sync::Arc;
 
     fn sections() -> Vec<PlacedRecovery> {
@@ -220,15 +285,27 @@ mod tests {
                 0.3 * number as f64,
             )
         };
-        shapes.into_iter().enumerate().map(made).collect()
+        shapes.into_iter().enumerate().map(made).chain([i_section()]).collect()
+    }
+
+    fn i_section() -> PlacedRecovery {
+        let profile = Profile::I { d: 2.0, b: 1.0, t_f: 0.1, t_w: 0.06, r: 0.0, b_top: 1.0, t_f_top: 0.1 };
+        let geometry = Geometry::new(Shape::Profile { profile, region: Region::new("i", 0) });
+        let materials = [Material::isotropic("steel", 1.0, 0.3, 1.0)];
+        let analysis = analyse(&geometry, &materials, MeshAim::Error(DEFAULT_AIM)).expect("a section");
+        let field = analysis.stresses(&materials).expect("stresses");
+        let law = FailureLaw { yield_stress: Some(2.0), ..FailureLaw::default() };
+        let section = Recovery::computed("i", field, Placement::default(), Corners::Exclude, &[Some(law)]);
+        PlacedRecovery::new(Arc::new(section), [0.0; 2], 0.0)
     }
 
     fn wave(i: usize) -> f64 {
         libm::sin(78.233 * i as f64) * 43758.5453 % 1.0
     }
 
-    /// Courses of resultants: at random, growing, growing along a curve, vibrating, and at rest.
-    fn courses() -> [fn(usize, usize) -> f64; 5] {
+    /// Courses of resultants: at random, growing, growing along a curve, vibrating, at rest, and turning
+    /// with small vibrations.
+    fn courses() -> [fn(usize, usize) -> f64; 6] {
         [
             |row, k| wave(6 * row + k),
             |row, k| wave(k) * (1 + row) as f64,
@@ -237,6 +314,11 @@ mod tests {
                 wave(k) * libm::sin(0.1 * row as f64) + wave(k + 10) * libm::cos((0.37 + 0.01 * k as f64) * row as f64)
             },
             |row, k| wave(k) * (1.0 + if row < 50 { row as f64 / 50.0 } else { 1.0 + 1e-15 * wave(row) }),
+            |row, k| {
+                let lag = [0.0, 0.0, 0.5, 0.7, 0.0, 0.5][k] * std::f64::consts::PI;
+                let small = 0.02 * libm::sin((0.9 + 0.1 * k as f64) * row as f64);
+                libm::cos(0.15 * row as f64 - lag) + small
+            },
         ]
     }
 
@@ -266,6 +348,13 @@ mod tests {
         }
     }
 
+    /// A course between two rows.
+    fn between(course: fn(usize, usize) -> f64, row: f64, k: usize) -> f64 {
+        let before = row.floor();
+        let part = row - before;
+        (1.0 - part) * course(before as usize, k) + part * course(before as usize + 1, k)
+    }
+
     /// Prints the nanoseconds of a row by section and course.
     #[test]
     #[ignore = "a study"]
@@ -274,7 +363,7 @@ mod tests {
         for (number, section) in sections().iter().enumerate() {
             for (kind, course) in courses().into_iter().enumerate() {
                 let rows: Vec<[f64; 6]> = (0..ROWS)
-                    .map(|row| std::array::from_fn(|k| course(400 * row / ROWS, k) * (1.0 + row as f64 * 1e-5)))
+                    .map(|row| std::array::from_fn(|k| between(course, 400.0 * row as f64 / ROWS as f64, k)))
                     .collect();
                 for criterion in [Criterion::VonMises, Criterion::FailureIndex] {
                     section.section().unit_peaks(criterion);

@@ -7,15 +7,17 @@ mod figure;
 mod largest_row;
 mod place;
 mod profile;
+mod quantity;
 mod reading;
 
 pub use columns::{
-    COLUMNS, ColumnGroup, ColumnPart, Dimension, ENERGY_WITH_CONTACTS, MeshError, Nearest, Need, Quantity,
-    STRESS_AT_POINT, STRESS_WITH_INDEX, Source, clocks, find_column, find_part, group, quantity,
+    COLUMNS, ColumnGroup, ColumnPart, ENERGY_WITH_CONTACTS, Nearest, Need, STRESS_AT_POINT, STRESS_WITH_INDEX, Source,
+    clocks, find_column, find_part, group, quantity,
 };
 pub use envelope::{Envelope, Extremes, Followed};
 pub use figure::{Figure, Line, LinePoint, Look};
-pub use largest_row::Extreme;
+pub use largest_row::{Extreme, LargestRow};
 pub use place::{BeamPoint, Place, StressPlace, StressPoint};
 pub use profile::{Profile, ProfilePlace, StageEnd};
+pub use quantity::{Dimension, MeshError, Quantity};
 pub use reading::{Probe, Reading};

@@ -3,6 +3,7 @@
 use crate::effect::elasticity::StressField;
 use crate::kernel::NodeMotion;
 use crate::kernel::element::MAX_NODES;
+use crate::kernel::law::{Strain, Stress};
 use crate::kernel::relative::Relative;
 use crate::kernel::seam::{Converted, conversion};
 use crate::kernel::shape::gauss;
@@ -137,6 +138,14 @@ pub struct StressPoint {
     pub stress: PointStress,
 }
 
+/// Strains and stresses at the Gauss points of the element that was evaluated last, at one state:
+/// neighbouring points share elements.
+#[derive(Default)]
+pub struct LastElement {
+    element: Option<u32>,
+    values: Vec<(Strain, Stress)>,
+}
+
 impl BeamPoint {
     /// N and M in section axes, see [`strain_and_stress`](Self::strain_and_stress).
     pub fn resultant(&self, state: &State, origin: Option<&State>) -> Vector6 {
@@ -147,9 +156,20 @@ impl BeamPoint {
     /// element, mean of both sides. `origin` is the state about which the stage is linear; `None`
     /// in other stages.
     pub fn strain_and_stress(&self, state: &State, origin: Option<&State>) -> [[f64; 6]; 2] {
+        self.strain_and_stress_after(&mut LastElement::default(), state, origin)
+    }
+
+    /// As [`strain_and_stress`](Self::strain_and_stress), with the element of the point before at the
+    /// same state.
+    pub fn strain_and_stress_after(
+        &self,
+        last: &mut LastElement,
+        state: &State,
+        origin: Option<&State>,
+    ) -> [[f64; 6]; 2] {
         let mut mean = [[0.0; 6]; 2];
         for &(element, xi) in &self.sides {
-            let values = self.one_side(element, xi, state, origin);
+            let values = self.one_side(last.at(element, self, state, origin), xi);
             for (sum, part) in mean.iter_mut().flatten().zip(values.iter().flatten()) {
                 *sum += part / self.sides.len() as f64;
             }
@@ -158,9 +178,7 @@ impl BeamPoint {
     }
 
     /// Strains and resultants of one side: the polynomial through the values at the Gauss points.
-    fn one_side(&self, element: u32, xi: f64, state: &State, origin: Option<&State>) -> [[f64; 6]; 2] {
-        let values = self.elasticity.iter().find_map(|field| field.at_points(element, state, origin));
-        let values = values.unwrap_or_default();
+    fn one_side(&self, values: &[(Strain, Stress)], xi: f64) -> [[f64; 6]; 2] {
         let abscissas: Vec<f64> = gauss(values.len()).iter().map(|&(x, _)| x).collect();
         let mut out = [[0.0; 6]; 2];
         for (g, (strain, stress)) in values.iter().enumerate() {
@@ -175,5 +193,16 @@ impl BeamPoint {
             }
         }
         out
+    }
+}
+
+impl LastElement {
+    /// Values of an element, which belongs to a point of a beam.
+    fn at(&mut self, element: u32, point: &BeamPoint, state: &State, origin: Option<&State>) -> &[(Strain, Stress)] {
+        if self.element != Some(element) {
+            let values = point.elasticity.iter().find_map(|field| field.at_points(element, state, origin));
+            *self = Self { element: Some(element), values: values.unwrap_or_default() };
+        }
+        &self.values
     }
 }

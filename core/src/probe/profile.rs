@@ -1,6 +1,6 @@
 //! Resultants along whole beams at the end of each stage.
 
-use super::place::BeamPoint;
+use super::place::{BeamPoint, LastElement};
 use crate::run::{Moment, Snapshot};
 use crate::section::recovery::PlacedRecovery;
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,8 @@ impl Profile {
 
     /// Takes a converged state.
     pub fn row(&mut self, at: &Snapshot) {
-        let of_place = |place: &ProfilePlace| place.inside.strain_and_stress(at.state, at.origin)[1];
+        let mut last = LastElement::default();
+        let of_place = |place: &ProfilePlace| place.inside.strain_and_stress_after(&mut last, at.state, at.origin)[1];
         let end = StageEnd { moment: at.moment(), resultants: self.places.iter().map(of_place).collect() };
         self.ends.retain(|known| known.moment.stage != at.stage);
         self.ends.push(end);

@@ -98,6 +98,20 @@ pub struct StressField {
     pub mesh: Mesh,
     /// Stresses at its nodes
     pub nodal: NodalStresses,
+    /// Why the mesh is that of the stiffness, where it was to be finer
+    pub coarse: Option<SectionError>,
+}
+
+impl StressField {
+    fn new(
+        mesh: Mesh,
+        materials: &[Material],
+        solution: &Solution,
+        coarse: Option<SectionError>,
+    ) -> Result<Self, SectionError> {
+        let nodal = NodalStresses::new(&mesh, materials, solution)?;
+        Ok(Self { mesh, nodal, coarse })
+    }
 }
 
 /// The aim of a mesh.
@@ -243,19 +257,64 @@ impl Analysis {
         let find = || {
             let jump = if self.refines_stresses { self.stress_jump() } else { 0 };
             if jump == 0 {
-                let nodal = NodalStresses::new(&self.mesh, materials, &self.solution)?;
-                return Ok(StressField { mesh: self.mesh.clone(), nodal });
+                return self.coarse_stresses(materials, None);
             }
-            let Computed { mesh, solution, .. } = Computed::new(&self.geometry, materials, self.level + jump)?;
-            let nodal = NodalStresses::new(&mesh, materials, &solution)?;
-            Ok(StressField { mesh, nodal })
+            let finer = Computed::new(&self.geometry, materials, self.level + jump)
+                .and_then(|Computed { mesh, solution, .. }| StressField::new(mesh, materials, &solution, None));
+            self.or_coarse(finer, materials)
         };
         self.stresses.get_or_init(find).as_ref().map_err(Clone::clone)
+    }
+
+    /// Stresses on a finer mesh; if they cannot be found, those on the mesh of the stiffness.
+    fn or_coarse(
+        &self,
+        finer: Result<StressField, SectionError>,
+        materials: &[Material],
+    ) -> Result<StressField, SectionError> {
+        match finer {
+            Ok(field) => Ok(field),
+            Err(SectionError::Interrupted) => Err(SectionError::Interrupted),
+            Err(error) => self.coarse_stresses(materials, Some(error)),
+        }
+    }
+
+    /// Stresses on the mesh of the stiffness.
+    fn coarse_stresses(
+        &self,
+        materials: &[Material],
+        coarse: Option<SectionError>,
+    ) -> Result<StressField, SectionError> {
+        StressField::new(self.mesh.clone(), materials, &self.solution, coarse)
     }
 
     /// Levels by which the mesh of stresses is finer.
     fn stress_jump(&self) -> usize {
         let nodes = |jump: usize| self.mesh.nodes.len() as f64 * REFINEMENT.powi(2 * jump as i32);
         (1..=MOST_STRESS_JUMP).rev().find(|&jump| nodes(jump) <= STRESS_NODES).unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::geometry::{Profile, Shape};
+    use super::super::mesh::Region;
+    use super::*;
+
+    #[test]
+    fn stresses_fall_back_to_the_mesh_of_the_stiffness() {
+        let profile = Profile::Rectangle { d: 2.0, b: 1.0 };
+        let geometry = Geometry::new(Shape::Profile { profile, region: Region::new("block", 0) });
+        let materials = [Material::isotropic("steel", 1.0, 0.3, 1.0)];
+        let analysis = analyse(&geometry, &materials, MeshAim::Error(DEFAULT_AIM)).expect("a section");
+        let error = SectionError::EmptyRegion { region: "block".into() };
+        let field = analysis.or_coarse(Err(error.clone()), &materials).expect("stresses");
+        assert_eq!(field.coarse, Some(error));
+        assert_eq!(field.mesh.nodes.len(), analysis.mesh.nodes.len());
+        let finer = analysis.stresses(&materials).expect("stresses");
+        assert_eq!(finer.coarse, None);
+        assert!(finer.mesh.nodes.len() > field.mesh.nodes.len());
+        let stopped = analysis.or_coarse(Err(SectionError::Interrupted), &materials);
+        assert_eq!(stopped.map(|_| ()), Err(SectionError::Interrupted));
     }
 }

@@ -15,6 +15,7 @@ use super::strength::FailureLaw;
 use super::stress::{Corners, Peak, extreme_principal_stresses, von_mises};
 use super::unit_peaks::{Parts, UnitPeaks};
 use super::{Matrix6, Point, Vector6};
+use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
 
 /// The part of a value by which a sample of a closed form may be below the largest one between
@@ -80,6 +81,27 @@ pub enum Criterion {
 
 impl Criterion {
     const COUNT: usize = 2;
+}
+
+/// Bounds of the largest value over a section, from the nodes of a mesh or the samples of a closed
+/// form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// A value that a point reaches
+    pub least: f64,
+    /// An upper bound of the largest value
+    pub most: f64,
+    /// The point that reaches `least`
+    pub at: SearchedPoint,
+}
+
+/// A node or sample of a section, among those that are searched for a criterion.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct SearchedPoint {
+    /// Number of the law of a material whose points are searched
+    search: usize,
+    /// Position of the point in the tree of these points
+    position: usize,
 }
 
 /// Where a shape lies on the beam.
@@ -238,7 +260,7 @@ impl Recovery {
     /// Of a computed section. `laws` are those of the materials, by their index.
     pub fn computed(
         name: &str,
-        StressField { mesh, nodal: stresses }: &StressField,
+        StressField { mesh, nodal: stresses, .. }: &StressField,
         placement: Placement,
         corners: Corners,
         laws: &[Option<FailureLaw>],
@@ -349,21 +371,49 @@ impl Recovery {
         self.search(&self.tree, self.spread(measure), &|s| measure.of(s), load, floor, None)
     }
 
-    /// A value of a criterion that a sample of the section reaches, if its largest value over the
-    /// section may be above a floor.
-    pub fn may_exceed(&self, criterion: Criterion, load: &Vector6, floor: f64) -> Option<f64> {
-        if self.closed.is_none() {
-            return Some(self.largest_of(criterion, load, floor)?.value);
-        }
-        let below = floor - BETWEEN_SAMPLES * floor.abs();
-        let reached = match criterion {
-            Criterion::VonMises => self.tree.largest(self.spread(Measure::VonMises), von_mises, load, below)?,
-            Criterion::FailureIndex => {
-                let search = self.failures.first()?;
-                search.tree.largest(search.spread(), |s| search.law.index(s), load, below)?
-            }
+    /// Bounds of the largest value of a criterion over the section, if it may be above a floor that is
+    /// not negative.
+    pub fn estimate(&self, criterion: Criterion, load: &Vector6, floor: f64) -> Option<Estimate> {
+        let missed = if self.closed.is_some() { BETWEEN_SAMPLES } else { 0.0 };
+        let mut found: Option<Estimate> = None;
+        let mut look = |tree: &PointTree, spread: &Spread, measure: &dyn Fn(&Vector6) -> f64, search: usize| {
+            let below = found.map_or((1.0 - missed) * floor, |found| found.least);
+            let Some(Hit { value, position, .. }) = tree.largest(spread, measure, load, below) else { return };
+            let at = SearchedPoint { search, position };
+            found = Some(Estimate { least: value, most: value / (1.0 - missed), at });
         };
-        Some(reached.value)
+        match criterion {
+            Criterion::VonMises => look(&self.tree, self.spread(Measure::VonMises), &von_mises, 0),
+            Criterion::FailureIndex => {
+                for (number, search) in self.failures.iter().enumerate() {
+                    look(&search.tree, search.spread(), &|s| search.law.index(s), number);
+                }
+            }
+        }
+        found
+    }
+
+    /// The value of a criterion at a point that an estimate for this criterion has told.
+    pub fn value_at(
+        &self,
+        criterion: Criterion,
+        SearchedPoint { search, position }: SearchedPoint,
+        load: &Vector6,
+    ) -> f64 {
+        match criterion {
+            Criterion::VonMises => von_mises(&self.tree.stress(position, load)),
+            Criterion::FailureIndex => {
+                self.failures.get(search).map_or(0.0, |search| search.law.index(&search.tree.stress(position, load)))
+            }
+        }
+    }
+
+    /// The strength by which the failure index of the section is its largest von Mises stress, if
+    /// nothing else counts at any of its points.
+    pub fn yield_stress_alone(&self) -> Option<f64> {
+        let [search] = &self.failures[..] else { return None };
+        let is_everywhere = search.points.len() == self.points.len();
+        search.law.yield_stress.filter(|_| is_everywhere && search.law.is_yield_alone())
     }
 
     fn spread(&self, measure: Measure) -> &Spread {

@@ -43,6 +43,8 @@ pub struct Hit {
     pub(super) value: f64,
     /// Number of the point
     pub(super) point: usize,
+    /// Position of the point in the order of the tree
+    pub(super) position: usize,
 }
 
 impl PointTree {
@@ -102,6 +104,11 @@ impl PointTree {
             largest
         };
         Spread(self.groups.iter().map(of_group).collect())
+    }
+
+    /// The stress at a point, given by its position in the order of the tree.
+    pub fn stress(&self, position: usize, load: &Vector6) -> Vector6 {
+        self.units[position] * load
     }
 
     /// The largest value of a measure above a floor.
@@ -179,7 +186,7 @@ impl PointTree {
             }
             for k in group.points.clone() {
                 let value = measure(&(self.units[k] * load));
-                see(Hit { value, point: self.numbers[k] as usize }, &mut limit);
+                see(Hit { value, point: self.numbers[k] as usize, position: k }, &mut limit);
             }
         }
     }

@@ -24,17 +24,6 @@ impl Strengths {
         Self { tension: [xt, yt, yt], compression: [xc, yc, yc], shear: [s12; 3] }
     }
 
-    /// Largest ratio of a stress component in material axes to its strength.
-    pub fn largest_stress_index(&self, stress: &Vector6) -> f64 {
-        let mut index = 0.0_f64;
-        for axis in 0..3 {
-            let s = stress[axis];
-            index = index.max(s / self.tension[axis]).max(-s / self.compression[axis]);
-            index = index.max(stress[3 + axis].abs() / self.shear[axis]);
-        }
-        index
-    }
-
     /// Inverse of the factor R by which a load grows to failure after Tsai and Wu 1971
     /// (doi:10.1177/002199837100500106): a R^2 + b R = 1, with interaction F_ij = -sqrt(F_ii F_jj)
     /// / 2.
@@ -104,7 +93,6 @@ mod tests {
             for factor in [0.5, 1.0, 2.0] {
                 let stress = Vector6::ith(component, factor * value);
                 assert!((strengths.tsai_wu_index(&stress) - factor).abs() < 1e-12);
-                assert!((strengths.largest_stress_index(&stress) - factor).abs() < 1e-12);
             }
         }
         assert_eq!(strengths.tsai_wu_index(&Vector6::zeros()), 0.0);

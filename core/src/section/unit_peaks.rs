@@ -67,16 +67,16 @@ impl UnitPeaks {
         if square > 0.0 { product(load) / square } else { 0.0 }
     }
 
-    /// Lower and upper bound of the value of a load by that of another one: the load is a multiple of
+    /// Lower and upper bound of the value of a load by those of another one: the load is a multiple of
     /// the other one, and what is left.
-    pub fn around(&self, load: &Vector6, known: &Vector6, value: f64) -> [f64; 2] {
+    pub fn around(&self, load: &Vector6, known: &Vector6, [least, most]: [f64; 2]) -> [f64; 2] {
         let part = self.part(load, known);
         let part = match self.parts {
             Parts::Any => part.max(0.0),
             Parts::Even | Parts::AxialAndShear { .. } => part,
         };
         let left = load - known * part;
-        [part.abs() * value - self.bound(&-left), part.abs() * value + self.bound(&left)]
+        [part.abs() * least - self.bound(&-left), part.abs() * most + self.bound(&left)]
     }
 
     /// Upper bound of the value of a load by the chord between two others with their values.

@@ -10,7 +10,7 @@ use beamsim_core::section::stress::{Corners, Peak};
 
 /// The largest value of a measure of the stress at the nodes of a section under a load.
 fn largest(
-    StressField { mesh, nodal }: &StressField,
+    StressField { mesh, nodal, .. }: &StressField,
     load: &Vector6,
     corners: Corners,
     measure: impl Fn(&Vector6) -> f64,

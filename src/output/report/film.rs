@@ -208,16 +208,15 @@ impl Film {
     }
 
     /// Largest von Mises stress of the section at each node. Between nodes where it is known it is
-    /// linear, as far as pictures go; zero where nothing of a beam is known.
+    /// linear, as far as pictures go; not a number where nothing of a beam is known.
     fn stress(&self, looks: &[Look]) -> Vec<f64> {
-        let Some(mut all) = self.figure.von_mises(looks) else { return vec![0.0; looks.len()] };
+        let Some(mut all) = self.figure.von_mises(looks) else { return vec![f64::NAN; looks.len()] };
         let mut first = 0;
         for line in &self.figure.lines {
             let fractions: Vec<f64> = line.points.iter().map(|point| point.inside.fraction).collect();
             fill_gaps(&fractions, &mut all[first..first + line.points.len()]);
             first += line.points.len();
         }
-        all[first..].fill(0.0);
         all
     }
 
@@ -381,7 +380,7 @@ fn fill_gaps(places: &[f64], values: &mut [f64]) {
         let next = known.partition_point(|&other| other < k);
         let before = next.checked_sub(1).map(|at| known[at]);
         values[k] = match (before, known.get(next)) {
-            (None, None) => 0.0,
+            (None, None) => f64::NAN,
             (Some(only), None) | (None, Some(&only)) => values[only],
             (Some(a), Some(&b)) => {
                 let part = (places[k] - places[a]) / (places[b] - places[a]);
@@ -471,7 +470,7 @@ mod tests {
         assert_eq!(values, [2.0, 2.0, 3.0, 4.0, 4.0]);
         let mut none = [f64::NAN; 2];
         fill_gaps(&[0.0, 1.0], &mut none);
-        assert_eq!(none, [0.0; 2]);
+        assert!(none.iter().all(|value| value.is_nan()));
     }
 
     #[test]
