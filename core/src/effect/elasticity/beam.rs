@@ -10,7 +10,7 @@ use crate::effect::{
     TangentForm, at_slots, for_each_batch, side_by_side,
 };
 use crate::kernel::law::{SectionLaw, StoredLaw, Strain, Stress};
-use crate::kernel::{ElementSystem, NodePlace, Weights};
+use crate::kernel::{ElementSystem, MAX_NODES, NodePlace, Weights};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, Real, each_lane};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Plane, Slot, State};
 use crate::tensor::Vec3;
@@ -450,10 +450,14 @@ fn extrapolate_side_by_side<I: Interpolation, const N: usize, const G: usize>(
 fn energy_of<I: Interpolation, const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> f64 {
     let mut sum = 0.0;
     let mut add = |energy: f64| sum += energy;
-    let done = Instructions::here().run_side_by_side(
-        #[inline(always)]
-        || each_energy::<I, _, _>(batch, at, &mut add),
-    );
+    // Energies are asked for once a step: lanes would be 130 kB for elements of four nodes.
+    let mut done = None;
+    if N < MAX_NODES {
+        done = Instructions::here().run_side_by_side(
+            #[inline(always)]
+            || each_energy::<I, _, _>(batch, at, &mut add),
+        );
+    }
     if done.is_none() {
         batch.iter().for_each(|element| add(element.energy::<I>(at)));
     }
