@@ -10,6 +10,7 @@ use crate::output::{
     Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, PartFile, Record, Scale, Units, quantity_of,
 };
 use beamsim_core::probe::{Quantity, clocks, quantity};
+use beamsim_core::sorting::sort_by;
 use std::path::{Path, PathBuf};
 
 /// Largest number of columns that are drawn without `--column`.
@@ -182,7 +183,7 @@ impl Abscissa {
                 }
             }
         }
-        found.sort_by(|a, b| a.at.total_cmp(&b.at));
+        sort_by(&mut found, |a, b| a.at.total_cmp(&b.at));
         found
     }
 }

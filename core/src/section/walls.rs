@@ -13,6 +13,7 @@ use super::error::{SectionError, check_positive, check_slenderness, show};
 use super::grid::Fineness;
 use super::mesh::{Mesh, ReentrantCorner, Region, Tangent};
 use super::outline::{arc_angles, distance};
+use crate::sorting::sort_by;
 use std::collections::HashMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -668,7 +669,7 @@ impl Strips {
             }
         }
         for stations in &mut self.stations {
-            stations.sort_by(|a, b| a.part.total_cmp(&b.part));
+            sort_by(stations, |a, b| a.part.total_cmp(&b.part));
         }
         self.check_stems()
     }
@@ -953,7 +954,7 @@ impl Vertices {
 
 /// Sorts faces from left to right, with those that are one dropped.
 fn sort_faces(faces: &mut Vec<f64>) {
-    faces.sort_by(|a, b| b.total_cmp(a));
+    sort_by(faces, |a, b| b.total_cmp(a));
     let thickness = faces[0] - faces[faces.len() - 1];
     faces.dedup_by(|a, b| (*a - *b).abs() <= SAME_FACE * thickness);
 }
