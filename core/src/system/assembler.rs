@@ -252,10 +252,15 @@ impl Assembler<'_> {
     #[inline(never)]
     fn add_one_lane(&mut self, k: usize, elements: &ElementSystem<Lanes>, lane: usize) {
         self.add_forces(k, elements, lane);
+        if !self.with_tangent {
+            return;
+        }
         if self.is_constrained(k) {
             self.add_constrained(k, elements.tiles(), |lanes| lanes.0[lane]);
-        } else if self.with_tangent {
-            self.add_free_tangent(k, elements, lane);
+        } else if self.places.whole {
+            self.add_whole(k, elements, lane);
+        } else {
+            self.add_blocks_of_lane(k, elements, lane);
         }
     }
 
@@ -269,17 +274,14 @@ impl Assembler<'_> {
         if !self.with_tangent {
             return;
         }
-        for lane in 0..count {
-            self.add_free_tangent(first + lane, elements, lane);
+        if self.places.whole {
+            for lane in 0..count {
+                self.add_whole(first + lane, elements, lane);
+            }
+            return;
         }
-    }
-
-    /// Adds the tangent of instance `k`, one lane of `elements`, without held directions.
-    #[inline(always)]
-    fn add_free_tangent(&mut self, k: usize, elements: &ElementSystem<Lanes>, lane: usize) {
-        match self.places.whole {
-            true => self.add_whole(k, elements, lane),
-            false => self.add_blocks_of_lane(k, elements, lane),
+        for lane in 0..count {
+            self.add_blocks_of_lane(first + lane, elements, lane);
         }
     }
 
