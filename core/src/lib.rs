@@ -48,6 +48,8 @@ pub mod interrupt;
 
 pub mod threads;
 
+pub mod sorting;
+
 pub mod scalar;
 pub mod tensor;
 

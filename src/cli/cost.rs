@@ -15,6 +15,7 @@ use crate::output::{Axis, HistoryReader, Level, Line, LinePlot, LineStyle, Outpu
 use crate::study::cost::{
     Against, CostRun, CostStudy, Expected, Family, Journal, Limit, Order, Orders, StudyOptions, study,
 };
+use beamsim_core::sorting::sort_by;
 use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
@@ -221,7 +222,7 @@ fn print_runs(found: &CostStudy) {
 /// The runs of the frontier, the least accurate first.
 fn frontier(found: &CostStudy) -> Vec<&CostRun> {
     let mut runs: Vec<&CostRun> = found.runs.iter().filter(|run| run.frontier).collect();
-    runs.sort_by(|a, b| b.error.total_cmp(&a.error));
+    sort_by(&mut runs, |a, b| b.error.total_cmp(&a.error));
     runs
 }
 
@@ -324,7 +325,7 @@ fn cost_and_error(run: &CostRun) -> (f64, f64) {
 fn family_line(found: &CostStudy, family: &Family, number: usize) -> Line {
     let is_drawn = |run: &&CostRun| run.variant.family == *family && run.error > 0.0;
     let mut runs: Vec<&CostRun> = found.runs.iter().filter(is_drawn).collect();
-    runs.sort_by(|a, b| a.timing.seconds.cpu.total_cmp(&b.timing.seconds.cpu));
+    sort_by(&mut runs, |a, b| a.timing.seconds.cpu.total_cmp(&b.timing.seconds.cpu));
     let mut least_error = f64::INFINITY;
     let (best, others): (Vec<&CostRun>, Vec<&CostRun>) = runs.into_iter().partition(|run| {
         let is_better = run.error < least_error;

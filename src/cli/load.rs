@@ -7,6 +7,7 @@ use crate::deck::{
 };
 use crate::output::{DeckSource, OutputError, TableSource};
 use crate::scene::{self, Scene};
+use beamsim_core::sorting::sort_by_key;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -259,7 +260,7 @@ fn expected_failures(deck: &Deck) -> Vec<String> {
 /// counted.
 pub fn render(path: &str, text: &str, diagnostics: &[Diagnostic]) -> String {
     let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
-    sorted.sort_by_key(|d| d.span.as_ref().map_or(0, |span| span.start));
+    sort_by_key(&mut sorted, |d| d.span.as_ref().map_or(0, |span| span.start));
     let mut shown: Vec<Message> = Vec::new();
     let mut hidden = 0;
     let mut lines = LineCounter { text: text.as_bytes(), at: 0, line: 1 };

@@ -8,6 +8,7 @@ use super::verdict::Verdict;
 use super::{console, load, outputs, plot_profile};
 use crate::output::{Axis, Boundary, HistoryReader, Line, LinePlot, Record, Scale, Units};
 use beamsim_core::probe::{Quantity, clocks, quantity};
+use beamsim_core::sorting::sort_by;
 use std::path::{Path, PathBuf};
 
 /// Largest number of columns that are drawn without `--column`.
@@ -162,7 +163,7 @@ impl Abscissa {
                 }
             }
         }
-        found.sort_by(|a, b| a.at.total_cmp(&b.at));
+        sort_by(&mut found, |a, b| a.at.total_cmp(&b.at));
         found
     }
 }

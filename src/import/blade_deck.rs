@@ -3,6 +3,7 @@
 use super::beamdyn::{Blade, BladeStation, Driver, KeyPoint, Origin};
 use super::deck_text::{Imported, comment, list, number, quoted, wrapped};
 use crate::scene::{NaturalSpline, Spline};
+use beamsim_core::sorting::sort_by;
 use beamsim_core::tensor::Vec3;
 use nalgebra::Matrix6;
 use std::f64::consts::PI;
@@ -207,7 +208,7 @@ fn places(blade: &Blade, axis: &Axis, driver: Option<&Driver>) -> Vec<f64> {
     let loads = driver.into_iter().flat_map(|driver| driver.points.iter().map(|(eta, _)| *eta));
     let others = keys.chain(ends).chain(loads).map(|place| (place, false));
     let mut all: Vec<(f64, bool)> = own.iter().map(|&eta| (eta, true)).chain(others).collect();
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sort_by(&mut all, |a, b| a.0.total_cmp(&b.0));
     let mut kept: Vec<(f64, bool)> = Vec::new();
     for (place, is_own) in all {
         match kept.last_mut() {

@@ -5,6 +5,7 @@ use super::beamdyn::{Blade, BladeStation, KeyPoint, MOST, ORDER, Origin, rigid};
 use super::lines::ImportError;
 use super::yaml::{Node, Yaml};
 use crate::scene::NaturalSpline;
+use beamsim_core::sorting::sort_numbers;
 use beamsim_core::tensor::Vec3;
 use nalgebra::Matrix6;
 use std::rc::Rc;
@@ -135,7 +136,7 @@ fn key_points(yaml: &Yaml, axis: &Node, twist: &Node) -> Result<Vec<KeyPoint>, I
 /// All places of several grids, in order.
 fn union<'g>(grids: impl Iterator<Item = &'g [f64]>) -> Vec<f64> {
     let mut all: Vec<f64> = grids.flatten().copied().collect();
-    all.sort_by(f64::total_cmp);
+    sort_numbers(&mut all);
     all.dedup_by(|next, before| *next - *before <= ONE_PLACE);
     all
 }

@@ -41,6 +41,7 @@ use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::model::{ElementInfo, ModelParts, StageKind};
 use beamsim_core::probe::{Figure, Need, Probe, ProfilePlace, StressPlace};
 use beamsim_core::run::{Approach, InitialMotion, Plan, Snapshot, Stage, StageWork, TimeStepping, Until, Warning};
+use beamsim_core::sorting::sort_by_key;
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
@@ -231,7 +232,7 @@ pub fn from_deck(deck: &Deck, mut diagnostics: Vec<Diagnostic>) -> Result<(Scene
         found.retain(|d| d.unknown.as_ref().is_some_and(|name| !deck.broken.iter().any(|b| about(name, b))));
     }
     diagnostics.append(&mut found);
-    diagnostics.sort_by_key(Diagnostic::is_warning);
+    sort_by_key(&mut diagnostics, Diagnostic::is_warning);
     let mut told: Vec<Diagnostic> = Vec::new();
     let mut hidden = 0;
     let mut hides_errors = false;

@@ -10,6 +10,7 @@ use beamsim_core::probe::{
     BeamPoint, COLUMNS, ColumnGroup, ENERGY_WITH_CONTACTS, Need, Place, Probe, ProfilePlace, Reading, STRESS_AT_POINT,
     STRESS_WITH_INDEX, Source, StressPlace, StressPoint, clocks, find_column, group,
 };
+use beamsim_core::sorting::sort_numbers;
 use beamsim_core::system::Node;
 use std::sync::Arc;
 
@@ -224,7 +225,7 @@ impl Columns<'_> {
         let beam = &self.mesh.beams[number];
         let stations = self.stresses.stations(&beam.name);
         let mut fractions: Vec<f64> = beam.fractions.iter().copied().chain(stations).collect();
-        fractions.sort_by(f64::total_cmp);
+        sort_numbers(&mut fractions);
         fractions.dedup_by(|a, b| (*a - *b).abs() <= SAME_PLACE);
         fractions
     }

@@ -13,6 +13,7 @@ use super::built::BuiltDeck;
 use crate::deck::{Deck, Division};
 use crate::scene::{Mesh, MeshBeam, Scene};
 use beamsim_core::run::Snapshot;
+use beamsim_core::sorting::sort_numbers;
 use beamsim_core::tensor::Mat3;
 
 /// Tolerance for the place of an element end, in elements.
@@ -122,7 +123,7 @@ fn pieces(deck: &Deck, scene: &Scene) -> Option<Vec<Vec<Piece>>> {
         let piece = |k: usize| {
             let inside = |&&(piece, t): &&(usize, f64)| piece == k && t > AT_END && t < 1.0 - AT_END;
             let mut kept: Vec<f64> = kept.iter().filter(inside).map(|&(_, t)| t).collect();
-            kept.sort_by(f64::total_cmp);
+            sort_numbers(&mut kept);
             kept.dedup_by(|a, b| (*a - *b).abs() < AT_END);
             let unit = (1..=MOST_UNITS).find(|&unit| kept.iter().all(|&t| is_end(t, unit)))?;
             let length = beam.line.pieces[k].length;

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 /// From the bottom to the top; each imports only what stands before it, and `deck`, the words, only the names of failures and
 /// warnings, and [`DECK_ROWS`].
 #[rustfmt::skip]
-const ORDER: [&str; 22] = [
-    "failure", "warning", "interrupt", "threads", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "section", "run", "probe",
+const ORDER: [&str; 23] = [
+    "failure", "warning", "interrupt", "threads", "sorting", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "section", "run", "probe",
     "deck", "scene", "import", "output", "study", "cli",
 ];
 

@@ -574,7 +574,7 @@ fn seam_holds<const N: usize>(
     for weights in WEIGHTS {
         let what = format!("{what}, {N} nodes, mask {mask:b}, {weights:?}, nodes {nodes:?}");
         let mut out: ElementSystem = ElementSystem::new(blocks.len());
-        converted.pull_back(weights, rates, rotation_block, &mut out, &|weights, system| {
+        converted.pull_back(weights, rates, &rotation_block, &mut out, &|weights, system| {
             evaluate(&one_chart, weights, system);
         });
         agree(&format!("force, {what}"), out.force(), &exact_force, 1e-12);
@@ -612,7 +612,7 @@ fn elastic_seam_holds<const N: usize>() {
             let converted = Converted::new(&nodes, mask);
             let one_chart: [NodeMotion; N] = from_fn(|i| converted.nodes[i]);
             let mut out: ElementSystem = ElementSystem::new(2 * N);
-            converted.pull_back(Weights::NONE, false, |j| 2 * j + 1, &mut out, &|_, system| {
+            converted.pull_back(Weights::NONE, false, &|j| 2 * j + 1, &mut out, &|_, system| {
                 *system = elastic(&points, &one_chart, 0.0);
             });
             let what = format!("force against energy, {what}, {N} nodes, mask {mask:b}, nodes {nodes:?}");

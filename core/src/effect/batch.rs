@@ -64,7 +64,7 @@ impl<const N: usize> Connection<N> {
         at: &State,
         weights: Weights,
         rates: bool,
-        rotation_block: impl Fn(usize) -> usize,
+        rotation_block: &dyn Fn(usize) -> usize,
         out: &mut ElementSystem,
         kernel: &dyn Fn(&[NodeMotion; N], Weights, &mut ElementSystem),
     ) {

@@ -220,6 +220,6 @@ fn add_alone<K: VolumeKernel, const N: usize>(
             point.map(|quantity| kernel.at_present(quantity)).add(kernel, nodes, weights, system);
         }
     };
-    element.connection.evaluate(at, weights, K::RATES, |j| K::BLOCKS.rotation(j), &mut system, &sum);
+    element.connection.evaluate(at, weights, K::RATES, &|j| K::BLOCKS.rotation(j), &mut system, &sum);
     out.add(number, &system);
 }

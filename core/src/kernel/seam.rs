@@ -85,7 +85,7 @@ impl<T: Real> Converted<T> {
         &self,
         weights: Weights,
         rates: bool,
-        rotation_block: impl Fn(usize) -> usize,
+        rotation_block: &dyn Fn(usize) -> usize,
         out: &mut ElementSystem<T>,
         evaluate: &dyn Fn(Weights, &mut ElementSystem<T>),
     ) {

@@ -11,8 +11,13 @@ use crate::tensor::{Mat3, Vec3};
 /// within 4e-16 of the angle for angles from 1e-9 to pi.
 #[inline(always)]
 pub fn log<T: Real>(r: Mat3<T>) -> Vec3<T> {
-    let Quaternion { scalar, vector } = quaternion(r);
-    vector * angle_over_sine(vector.squared(), scalar)
+    T::apart(
+        #[inline(always)]
+        || {
+            let Quaternion { scalar, vector } = quaternion(r);
+            vector * angle_over_sine(vector.squared(), scalar)
+        },
+    )
 }
 
 /// 2 atan2(|q|, q0)/|q| for z = |q|^2 of a unit quaternion with q0 >= 0; smooth at zero.

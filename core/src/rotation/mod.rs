@@ -36,6 +36,14 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn new(p: Vec3<T>) -> Self {
+        T::apart(
+            #[inline(always)]
+            || Self::of_vector(p),
+        )
+    }
+
+    #[inline(always)]
+    fn of_vector(p: Vec3<T>) -> Self {
         let series = Series::at(p.squared());
         let [f0, f1, f2, f3, ..] = series.0;
         let skew = p.skew();

@@ -114,6 +114,11 @@ impl Real for Jet {
     fn above(self, limit: f64, then: Self, otherwise: Self) -> Self {
         if self.value > limit { then } else { otherwise }
     }
+
+    #[inline(never)]
+    fn apart<R>(work: impl FnOnce() -> R) -> R {
+        work()
+    }
 }
 
 #[cfg(test)]

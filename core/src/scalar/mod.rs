@@ -42,6 +42,14 @@ pub trait Real:
     /// `then` if the value is above `limit`, otherwise `otherwise`; lane by lane.
     fn above(self, limit: f64, then: Self, otherwise: Self) -> Self;
 
+    /// Runs `work`. Scalars of single elements compile it once, apart from its callers, which keeps
+    /// long formulas from being repeated in them; lanes keep it in the caller, where the wide
+    /// registers are.
+    #[inline(always)]
+    fn apart<R>(work: impl FnOnce() -> R) -> R {
+        work()
+    }
+
     /// Zero.
     #[inline(always)]
     fn zero() -> Self {
@@ -79,5 +87,10 @@ impl Real for f64 {
     #[inline(always)]
     fn above(self, limit: f64, then: Self, otherwise: Self) -> Self {
         if self > limit { then } else { otherwise }
+    }
+
+    #[inline(never)]
+    fn apart<R>(work: impl FnOnce() -> R) -> R {
+        work()
     }
 }

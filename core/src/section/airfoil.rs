@@ -4,6 +4,7 @@
 use super::Point;
 use super::error::{SectionError, check_positive};
 use super::walls::{Ply, Walls};
+use crate::sorting::sort_by;
 
 /// A step of the skin at a web is moved backwards by this many thicknesses of the web
 const STEP_BEHIND_WEB: f64 = 1.5;
@@ -223,13 +224,13 @@ impl Airfoil {
         }
         let first = side.points[0][0];
         inserted.retain(|(x, _)| *x > first + SAME_PLACE && *x <= end);
-        inserted.sort_by(|a, b| a.0.total_cmp(&b.0));
+        sort_by(&mut inserted, |a, b| a.0.total_cmp(&b.0));
         inserted.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-9);
         let is_free = |point: &&Point| point[0] < end && inserted.iter().all(|(x, room)| (point[0] - x).abs() > *room);
         let mut points: Vec<Point> = vec![side.points[0]];
         points.extend(side.points[1..].iter().filter(is_free));
         points.extend(inserted.iter().map(|&(x, _)| [x, side.height(x)]));
-        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        sort_by(&mut points, |a, b| a[0].total_cmp(&b[0]));
         points
     }
 }

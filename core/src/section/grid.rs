@@ -6,6 +6,7 @@ use super::blocks::BlockMesher;
 use super::divide::{End, divide};
 use super::error::{SectionError, check_positive};
 use super::mesh::{Mesh, ReentrantCorner, Region};
+use crate::sorting::sort_numbers;
 use std::collections::HashMap;
 
 /// Coordinates nearer than this part of the size of the section are the same
@@ -227,7 +228,7 @@ pub fn mesh_rects(rects: &[Rect], regions: &[Region], fineness: Fineness) -> Res
 /// Sorted values, those nearer than a tolerance once.
 fn distinct(values: impl Iterator<Item = f64>, tolerance: f64) -> Vec<f64> {
     let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
+    sort_numbers(&mut sorted);
     sorted.dedup_by(|a, b| (*a - *b).abs() <= tolerance);
     sorted
 }

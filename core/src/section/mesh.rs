@@ -3,6 +3,7 @@
 use super::Point;
 use super::element::{ElementKind, MAX_NODES, SectionPoint};
 use super::error::SectionError;
+use crate::sorting::sort_by;
 use std::collections::HashMap;
 
 /// Boundaries nearer than this part of the size of the section are on one line
@@ -165,7 +166,7 @@ impl Mesh {
         let mut pieces = self.boundary();
         let low = |piece: &BoundaryPiece, axis: usize| piece.ends[0][axis].min(piece.ends[1][axis]);
         let high = |piece: &BoundaryPiece, axis: usize| piece.ends[0][axis].max(piece.ends[1][axis]);
-        pieces.sort_by(|a, b| low(a, 0).total_cmp(&low(b, 0)));
+        sort_by(&mut pieces, |a, b| low(a, 0).total_cmp(&low(b, 0)));
         for (k, first) in pieces.iter().enumerate() {
             // Pieces that begin further right than this one ends cannot cross it.
             for second in pieces[k + 1..].iter().take_while(|second| low(second, 0) <= high(first, 0) + slack) {

@@ -15,6 +15,7 @@ use super::strength::FailureLaw;
 use super::stress::{Corners, Peak, extreme_principal_stresses, von_mises};
 use super::unit_peaks::{Parts, UnitPeaks};
 use super::{Matrix6, Point, Vector6};
+use crate::sorting::sort_by;
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
 
@@ -471,7 +472,7 @@ impl Recovery {
         let below = |value: f64| value - BETWEEN_SAMPLES * value.abs();
         let first = tree.largest(spread, measure, load, below(floor))?;
         let mut hits = tree.above(spread, measure, load, below(first.value));
-        hits.sort_by(|a, b| b.value.total_cmp(&a.value).then(a.point.cmp(&b.point)));
+        sort_by(&mut hits, |a, b| b.value.total_cmp(&a.value).then(a.point.cmp(&b.point)));
         if hits.is_empty() {
             hits.push(first);
         }

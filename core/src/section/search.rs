@@ -7,6 +7,7 @@
 //! differences of unit stresses from the middle. The search is exact.
 
 use super::{Matrix6, Point, Vector6};
+use crate::sorting::sort_by;
 use std::ops::Range;
 
 /// Points of the smallest groups
@@ -180,7 +181,7 @@ impl PointTree {
             let group = &self.groups[index];
             if let Some([first, second]) = group.parts {
                 let mut both = [(bound(first), first), (bound(second), second)];
-                both.sort_by(|a, b| a.0.total_cmp(&b.0));
+                sort_by(&mut both, |a, b| a.0.total_cmp(&b.0));
                 open.extend(both);
                 continue;
             }

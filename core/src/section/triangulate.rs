@@ -9,6 +9,7 @@ use super::error::{SectionError, check_slenderness};
 use super::grid::Fineness;
 use super::mesh::{Element, Mesh, ReentrantCorner, Region, lines_cross};
 use super::outline::{Outline, Side, arc_angles, distance};
+use crate::sorting::{sort_by, sort_numbers};
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -178,7 +179,7 @@ impl Boundaries {
         // Sorted by their left ends, pieces can only cross those that begin before they end.
         let left = |piece: &Piece| piece.ends[0][0].min(piece.ends[1][0]);
         let right = |piece: &Piece| piece.ends[0][0].max(piece.ends[1][0]);
-        pieces.sort_by(|a, b| left(a).total_cmp(&left(b)));
+        sort_by(&mut pieces, |a, b| left(a).total_cmp(&left(b)));
         for (k, first) in pieces.iter().enumerate() {
             for second in pieces[k + 1..].iter().take_while(|second| left(second) <= right(first)) {
                 if first.side != second.side && lines_cross(first.ends, second.ends, SAME_POINT * self.size) {
@@ -228,7 +229,7 @@ impl Boundaries {
                     }
                     Side::Arc { .. } => Vec::new(),
                 };
-                on_side.sort_by(|a, b| a.0.total_cmp(&b.0));
+                sort_by(&mut on_side, |a, b| a.0.total_cmp(&b.0));
                 divided.points.push(from);
                 divided.sides.push(outline.sides[side]);
                 for (_, point) in on_side {
@@ -270,7 +271,7 @@ impl Boundaries {
         }
         // The order of a hash map must not decide about the last digits.
         let mut lengths: Vec<f64> = sides.into_values().filter(|(count, _)| *count == 1).map(|(_, l)| l).collect();
-        lengths.sort_by(f64::total_cmp);
+        sort_numbers(&mut lengths);
         lengths.iter().sum()
     }
 
@@ -286,7 +287,7 @@ impl Boundaries {
         let mut corners: Vec<_> = filled.into_values().collect();
         corners.retain(|(_, angle)| *angle > PI + CORNER_ANGLE && *angle < TAU - CORNER_ANGLE);
         // The order of a hash map must not decide about the mesh.
-        corners.sort_by(|(a, _), (b, _)| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+        sort_by(&mut corners, |(a, _), (b, _)| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
         corners.into_iter().map(|(at, _)| ReentrantCorner { at, wall: self.wall_at(at) }).collect()
     }
 

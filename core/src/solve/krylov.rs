@@ -5,6 +5,7 @@
 
 use crate::interrupt;
 use crate::scalar::{Instructions, LANES, Lanes};
+use crate::sorting::sort_by;
 use crate::threads;
 use faer::linalg::solvers::{Eigen, SelfAdjointEigen};
 use faer::{Mat, Side};
@@ -378,7 +379,7 @@ impl KrylovSpace {
             true => on_projection(self.symmetric_part(), symmetric_eigenvalues)?,
             false => on_projection(self.projection(), eigenvalues)?,
         };
-        values.sort_by(largest_first);
+        sort_by(&mut values, largest_first);
         values.truncate(wanted);
         Some(values)
     }
@@ -389,7 +390,7 @@ impl KrylovSpace {
             true => on_projection(self.symmetric_part(), symmetric_eigenpairs)?,
             false => on_projection(self.projection(), eigenpairs)?,
         };
-        pairs.sort_by(|a, b| largest_first(&a.0, &b.0));
+        sort_by(&mut pairs, |a, b| largest_first(&a.0, &b.0));
         pairs.truncate(wanted);
         Some(pairs)
     }

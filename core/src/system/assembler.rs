@@ -191,7 +191,6 @@ impl Assembler<'_> {
 
     /// Adds forces and tangent of instance `k`; the blocks of `element` are in the order of the
     /// slots of the instance.
-    #[inline]
     pub fn add(&mut self, k: usize, element: &ElementSystem) {
         let forces = &mut *self.force;
         let first_slot = self.first_slot;
@@ -221,16 +220,13 @@ impl Assembler<'_> {
         mut alone: impl FnMut(usize, &mut Self),
     ) {
         if !(0..count).any(|lane| is_apart(lane) || self.is_constrained(first + lane)) {
-            return self.add_free(first, 0..count, elements);
+            return self.add_free(first, count, elements);
         }
         for lane in 0..count {
             if is_apart(lane) {
                 alone(lane, self);
-            } else if self.is_constrained(first + lane) {
-                self.add_forces(first + lane, elements, lane);
-                self.add_constrained(first + lane, elements.tiles(), |lanes| lanes.0[lane]);
             } else {
-                self.add_free(first, lane..lane + 1, elements);
+                self.add_one_lane(first + lane, elements, lane);
             }
         }
     }
@@ -251,33 +247,56 @@ impl Assembler<'_> {
         }
     }
 
-    /// Adds some lanes of `elements` whose instances have neither held directions nor rotated axes;
-    /// lane 0 is instance `first`.
+    /// Adds instance `k`, which is one lane of `elements`. It is compiled once, not for every kernel
+    /// that runs in lanes: most rows of instances are free.
+    #[inline(never)]
+    fn add_one_lane(&mut self, k: usize, elements: &ElementSystem<Lanes>, lane: usize) {
+        self.add_forces(k, elements, lane);
+        if !self.with_tangent {
+            return;
+        }
+        if self.is_constrained(k) {
+            self.add_constrained(k, elements.tiles(), |lanes| lanes.0[lane]);
+        } else if self.places.whole {
+            self.add_whole(k, elements, lane);
+        } else {
+            self.add_blocks_of_lane(k, elements, lane);
+        }
+    }
+
+    /// Adds the first `count` lanes of `elements`, whose instances from `first` on have neither held
+    /// directions nor rotated axes.
     #[inline(always)]
-    fn add_free(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
-        for lane in lanes.clone() {
+    fn add_free(&mut self, first: usize, count: usize, elements: &ElementSystem<Lanes>) {
+        for lane in 0..count {
             self.add_forces(first + lane, elements, lane);
         }
         if !self.with_tangent {
             return;
         }
         if self.places.whole {
-            return self.add_whole(first, lanes, elements);
+            for lane in 0..count {
+                self.add_whole(first + lane, elements, lane);
+            }
+            return;
         }
-        for lane in lanes {
-            self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
+        for lane in 0..count {
+            self.add_blocks_of_lane(first + lane, elements, lane);
         }
     }
 
-    /// Adds the tangents of some lanes whose instances couple whole nodes, one instance after the
-    /// other.
+    /// Adds the tangent of instance `k`, one lane of `elements`, which couples whole nodes.
     #[inline(always)]
-    fn add_whole(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
-        for lane in lanes {
-            for (tile, &place) in elements.tiles().iter().zip(self.places.of(first + lane)) {
-                add_lane(self.values.tile(place), tile, lane);
-            }
+    fn add_whole(&mut self, k: usize, elements: &ElementSystem<Lanes>, lane: usize) {
+        for (tile, &place) in elements.tiles().iter().zip(self.places.of(k)) {
+            add_lane(self.values.tile(place), tile, lane);
         }
+    }
+
+    /// Adds the tangent of instance `k`, one lane of `elements`, block by block.
+    #[inline(never)]
+    fn add_blocks_of_lane(&mut self, k: usize, elements: &ElementSystem<Lanes>, lane: usize) {
+        self.add_blocks(k, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
     }
 
     /// Adds the first `count` lanes of planar elements, which are the instances from `first` on and

@@ -3,6 +3,7 @@
 use super::estimate::ErrorShare;
 use super::round::{Compared, Round};
 use crate::study::cost::{Pace, Variant};
+use beamsim_core::sorting::sort_by;
 
 /// The error of a variant.
 pub struct Estimate {
@@ -53,7 +54,7 @@ impl Estimates {
             all.extend(alike.map(|alike| of(&alike, share, false)));
         }
         all.retain(|candidate| candidate.estimate.ratio() <= 1.0);
-        all.sort_by(|a, b| a.variant.work().total_cmp(&b.variant.work()));
+        sort_by(&mut all, |a, b| a.variant.work().total_cmp(&b.variant.work()));
         all
     }
 }

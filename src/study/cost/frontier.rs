@@ -1,6 +1,7 @@
 //! The Pareto frontier of error and time: the runs that no other run beats in both.
 
 use super::run::CostRun;
+use beamsim_core::sorting::sort_by;
 
 /// The error of a run, at least the resolution of the reference; infinite where the run cannot be
 /// compared.
@@ -14,7 +15,7 @@ pub(super) fn near(runs: &[CostRun], resolution: f64, near: f64) -> Vec<usize> {
     let known = |k: &usize| error_of(&runs[*k], resolution).is_finite();
     let time = |k: usize| runs[k].timing.seconds.cpu;
     let mut order: Vec<usize> = (0..runs.len()).filter(known).collect();
-    order.sort_by(|&a, &b| error_of(&runs[a], resolution).total_cmp(&error_of(&runs[b], resolution)));
+    sort_by(&mut order, |&a, &b| error_of(&runs[a], resolution).total_cmp(&error_of(&runs[b], resolution)));
     let mut best = f64::INFINITY;
     let mut chosen = Vec::new();
     for group in order.chunk_by(|&a, &b| error_of(&runs[a], resolution) == error_of(&runs[b], resolution)) {

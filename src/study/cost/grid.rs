@@ -5,6 +5,7 @@ use super::mesher::Mesher;
 use super::variant::{Family, Pace, Variant, dynamic_stages, may_take_lobatto};
 use crate::deck::{Cost, Deck, InterpolationWord, SchemeName, StageBody};
 use crate::scene::Scene;
+use beamsim_core::sorting::{sort_by, sort_numbers};
 
 /// Orders, unless the deck names some.
 const ORDERS: [usize; 3] = [1, 2, 3];
@@ -56,7 +57,7 @@ impl Grid {
         }
         let usual = if dynamic { ELEMENTS_DYNAMIC.to_vec() } else { ELEMENTS_STATIC.to_vec() };
         let mut meshes = if bent { elements.unwrap_or(usual) } else { vec![1.0] };
-        meshes.sort_by(f64::total_cmp);
+        sort_numbers(&mut meshes);
         Self { families, meshes, paces }
     }
 
@@ -85,7 +86,7 @@ fn paces(deck: &Deck, step: Option<Vec<f64>>, step_tolerance: Option<Vec<f64>>) 
         dynamic_stages(deck).map(|(_, body)| matches!(body, StageBody::Dynamic { step_tolerance: Some(_), .. }));
     let Some(first) = adapts.next() else { return vec![Pace::Timeless] };
     let falling = |mut list: Vec<f64>| {
-        list.sort_by(|a, b| b.total_cmp(a));
+        sort_by(&mut list, |a, b| b.total_cmp(a));
         list
     };
     if step_tolerance.is_some() || (first && step.is_none()) {

@@ -12,6 +12,7 @@ use crate::study::parallel::in_parallel;
 use crate::study::strains::StrainRecord;
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::{Failure, Moment};
+use beamsim_core::sorting::{sort_by, sort_numbers};
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
@@ -141,7 +142,7 @@ impl<'a, 'o> Pool<'a, 'o> {
         let mut trials: Vec<Option<Trial>> = keys.iter().map(|key| self.options.journal.find(key)).collect();
         let mut open: Vec<usize> = (0..variants.len()).filter(|&k| trials[k].is_none()).collect();
         // The queue is emptied from its end: long runs first, but short ones first within a budget.
-        open.sort_by(|&a, &b| variants[b].work().total_cmp(&variants[a].work()));
+        sort_by(&mut open, |&a, &b| variants[b].work().total_cmp(&variants[a].work()));
         if self.deadline.0.is_none() {
             open.reverse();
         }
@@ -235,7 +236,7 @@ impl Timing {
     fn of(times: &[Seconds]) -> Self {
         let sorted = |pick: fn(&Seconds) -> f64| {
             let mut all: Vec<f64> = times.iter().map(pick).collect();
-            all.sort_by(f64::total_cmp);
+            sort_numbers(&mut all);
             all
         };
         let cpu = sorted(|t| t.cpu);

@@ -11,6 +11,7 @@ use crate::study::StudyError;
 use crate::study::built::BuiltDeck;
 use crate::study::outcome::{Outcome, columns};
 use beamsim_core::run::Failure;
+use beamsim_core::sorting::{sort_by, sort_numbers};
 use change::changes;
 use present::acts;
 
@@ -110,7 +111,7 @@ pub fn study_effects(
         progress(&format!("without {}", word.word()));
         reduced.push(baseline.without(&[word])?);
     }
-    reduced.sort_by(|a, b| b.largest().0.total_cmp(&a.largest().0));
+    sort_by(&mut reduced, |a, b| b.largest().0.total_cmp(&a.largest().0));
     progress("without all effects that can be left out");
     let cheapest = baseline.cheapest(&reduced, tolerance)?;
     Ok(EffectStudy { columns, reduced, absent, cheapest, whole })
@@ -181,7 +182,7 @@ fn timed(scene: &Scene, most_attempts: u64, interrupted: &dyn Fn() -> Option<i32
     while outcome.ended.is_ok() && times.len() < MOST_REPEATS && times.iter().sum::<f64>() < TIMED_SECONDS {
         times.push(once().seconds);
     }
-    times.sort_by(f64::total_cmp);
+    sort_numbers(&mut times);
     outcome.seconds = times[times.len() / 2];
     outcome
 }

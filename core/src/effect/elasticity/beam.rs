@@ -10,7 +10,7 @@ use crate::effect::{
     TangentForm, at_slots, for_each_batch, side_by_side,
 };
 use crate::kernel::law::{SectionLaw, StoredLaw, Strain, Stress};
-use crate::kernel::{ElementSystem, NodePlace, Weights};
+use crate::kernel::{ElementSystem, MAX_NODES, NodePlace, Weights};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, Real, each_lane};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Plane, Slot, State};
 use crate::tensor::Vec3;
@@ -44,20 +44,74 @@ impl<I: Interpolation> BeamElasticity<I> {
     }
 
     /// The number of integration points of the elements before number `element`.
-    pub(super) fn points_before(&self, element: usize) -> usize {
-        let two = self.elements.two.len();
-        let three = self.elements.three.len();
-        element + element.saturating_sub(two) + element.saturating_sub(two + three)
+    fn points_before(&self, element: usize) -> usize {
+        self.elements.points_before(element)
     }
 
     /// The stresses that form the geometric parts of the tangent, by point; empty if these are the
     /// present stresses.
-    pub(super) fn remembered<'a>(&'a self, memory: &'a Memory) -> &'a [[f64; 6]] {
+    fn remembered<'a>(&'a self, memory: &'a Memory) -> &'a [[f64; 6]] {
         match &self.unstressed {
             Some(none) => none,
             None if memory.valid => &memory.points,
             None => &[],
         }
+    }
+}
+
+impl ElasticElements {
+    /// The number of integration points of the elements before number `element`.
+    pub(super) fn points_before(&self, element: usize) -> usize {
+        let two = self.two.len();
+        let three = self.three.len();
+        element + element.saturating_sub(two) + element.saturating_sub(two + three)
+    }
+}
+
+/// Elastic beams in space as their planar form asks for them: of any interpolation, since in the
+/// plane interpolations do not differ.
+pub(super) trait SpatialBeams: Send + Sync {
+    /// The elements.
+    fn elements(&self) -> &ElasticElements;
+
+    /// The stresses that form the geometric parts of the tangent, by point; empty if these are the
+    /// present stresses.
+    fn remembered<'a>(&'a self, memory: &'a Memory) -> &'a [[f64; 6]];
+
+    /// Adds one element, instance `number`, in space. `remembered` holds the stresses of geometric
+    /// parts at its points, or is empty; `work` is scratch memory for elements of its order.
+    fn add_one(
+        &self,
+        number: usize,
+        remembered: &[[f64; 6]],
+        at: &State,
+        stiffness: f64,
+        work: &mut Workspace,
+        out: &mut Assembler,
+    );
+}
+
+impl<I: Interpolation> SpatialBeams for BeamElasticity<I> {
+    fn elements(&self) -> &ElasticElements {
+        &self.elements
+    }
+
+    fn remembered<'a>(&'a self, memory: &'a Memory) -> &'a [[f64; 6]] {
+        self.remembered(memory)
+    }
+
+    fn add_one(
+        &self,
+        number: usize,
+        remembered: &[[f64; 6]],
+        at: &State,
+        stiffness: f64,
+        work: &mut Workspace,
+        out: &mut Assembler,
+    ) {
+        for_each_batch!(self.elements, number..number + 1, |_first, batch| for element in batch {
+            element.add::<I>(number, stresses_of(remembered, 0), at, stiffness, work, out);
+        });
     }
 }
 
@@ -272,12 +326,12 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
 }
 
 /// Memory for the computation of single elements of a batch.
-pub(super) fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> Workspace {
+fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> Workspace {
     Workspace::new(N)
 }
 
 /// The remembered stresses of the points of element k; `None` if there are none.
-pub(super) fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> Option<[Stress; G]> {
+fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> Option<[Stress; G]> {
     let own = remembered.get(k * G..(k + 1) * G)?;
     Some(std::array::from_fn(|g| unpack(&own[g])))
 }
@@ -396,10 +450,14 @@ fn extrapolate_side_by_side<I: Interpolation, const N: usize, const G: usize>(
 fn energy_of<I: Interpolation, const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> f64 {
     let mut sum = 0.0;
     let mut add = |energy: f64| sum += energy;
-    let done = Instructions::here().run_side_by_side(
-        #[inline(always)]
-        || each_energy::<I, _, _>(batch, at, &mut add),
-    );
+    // Energies are asked for once a step: lanes would be 130 kB for elements of four nodes.
+    let mut done = None;
+    if N < MAX_NODES {
+        done = Instructions::here().run_side_by_side(
+            #[inline(always)]
+            || each_energy::<I, _, _>(batch, at, &mut add),
+        );
+    }
     if done.is_none() {
         batch.iter().for_each(|element| add(element.energy::<I>(at)));
     }
@@ -514,7 +572,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     /// Adds this element alone as instance `number`; its nodes may have rotation vectors in
     /// different charts.
     #[inline(never)]
-    pub(super) fn add<I: Interpolation>(
+    fn add<I: Interpolation>(
         &self,
         number: usize,
         stresses: Option<[Stress; G]>,

@@ -156,7 +156,13 @@ pub trait View<const N: usize, T: Real> {
 
     /// Overwrites `out` with force and `stiffness` times the tangent of a sum over points, carried
     /// back to the nodes of the scene.
-    fn fill<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>);
+    fn fill<K: PointSum<N, T> + ?Sized>(
+        &self,
+        sum: &K,
+        stiffness: f64,
+        scratch: &mut Scratch<T>,
+        out: &mut ElementSystem<T>,
+    );
 
     /// The stresses at the points, extrapolated over variations of displacements and rotation
     /// vectors. `free` is the amplitude of the free strain.
@@ -205,11 +211,29 @@ pub trait Interpolation: Send + Sync + 'static {
     /// An element in the frame of its kernel
     type View<const N: usize, T: Real>: View<N, T>;
 
+    /// The view of a single element; compiled once for all that look at single elements.
+    #[inline(never)]
+    fn alone<const N: usize, T: Real>(configuration: &ElementConfiguration<N, T>) -> Self::View<N, T> {
+        Self::View::new(configuration)
+    }
+
+    /// [`View::fill`] for a single element; compiled once for all sums.
+    #[inline(never)]
+    fn fill_alone<const N: usize>(
+        view: &Self::View<N, f64>,
+        sum: &dyn PointSum<N, f64>,
+        stiffness: f64,
+        scratch: &mut Scratch,
+        out: &mut ElementSystem,
+    ) {
+        view.fill(sum, stiffness, scratch, out);
+    }
+
     /// The view of an element in a state, with its nodes in one chart.
     #[inline(never)]
     fn see<const N: usize>(member: ElementNodes<N>, at: &State) -> Self::View<N, f64> {
         let nodes = member.connection.motions_in_one_chart(at);
-        Self::View::new(&ElementConfiguration::new(member, &nodes, at))
+        Self::alone(&ElementConfiguration::new(member, &nodes, at))
     }
 
     /// Variations at the nodes in the frame of the kernel for increments `dq` of the unknowns by
@@ -223,19 +247,19 @@ pub trait Interpolation: Send + Sync + 'static {
     /// Overwrites `out` with a sum over the points of an element, carried back to the nodes of the
     /// scene and to their charts.
     #[inline(never)]
-    fn evaluate<const N: usize, K: PointSum<N, f64>>(
+    fn evaluate<const N: usize>(
         member: ElementNodes<N>,
         at: &State,
         stiffness: f64,
         scratch: &mut Scratch,
         out: &mut ElementSystem,
-        sum: &K,
+        sum: &dyn PointSum<N, f64>,
     ) {
         let weights = Weights { stiffness, ..Weights::NONE };
         let scratch = std::cell::RefCell::new(scratch);
-        member.connection.evaluate(at, weights, false, after_displacement, out, &|nodes, weights, out| {
-            let view = Self::View::new(&ElementConfiguration::new(member, nodes, at));
-            view.fill(sum, weights.stiffness, &mut scratch.borrow_mut(), out);
+        member.connection.evaluate(at, weights, false, &after_displacement, out, &|nodes, weights, out| {
+            let view = Self::alone(&ElementConfiguration::new(member, nodes, at));
+            Self::fill_alone(&view, sum, weights.stiffness, &mut scratch.borrow_mut(), out);
         });
     }
 }
@@ -296,7 +320,13 @@ impl<const N: usize, T: Real> View<N, T> for TotalView<N, T> {
     }
 
     #[inline(always)]
-    fn fill<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, _scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
+    fn fill<K: PointSum<N, T> + ?Sized>(
+        &self,
+        sum: &K,
+        stiffness: f64,
+        _scratch: &mut Scratch<T>,
+        out: &mut ElementSystem<T>,
+    ) {
         out.clear_for(Weights { stiffness, ..Weights::NONE });
         sum.add(&self.nodes, stiffness, out);
     }
@@ -352,7 +382,13 @@ impl<const N: usize, T: Real> View<N, T> for RelativeView<N, T> {
     }
 
     #[inline(always)]
-    fn fill<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
+    fn fill<K: PointSum<N, T> + ?Sized>(
+        &self,
+        sum: &K,
+        stiffness: f64,
+        scratch: &mut Scratch<T>,
+        out: &mut ElementSystem<T>,
+    ) {
         if let Some(HalfWayPoint { point, free, geometric }) = sum.half_way() {
             return self.seen.fill_half_way(&self.rotations, point, free, geometric, stiffness, out);
         }

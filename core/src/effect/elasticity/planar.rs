@@ -1,8 +1,8 @@
 //! Elasticity of beams in a planar scene: elements with three unknowns at each node.
 
-use super::beam::{BeamElasticity, stresses_of, workspace};
+use super::beam::SpatialBeams;
 use super::element::{BeamLaw, ElasticElement};
-use super::interpolation::Interpolation;
+use super::interpolation::Workspace;
 use crate::effect::{ByOrder, ELEMENTS_PER_TASK, PlanarForm, at_slots, own_blocks};
 use crate::kernel::law::{PlanarStress, StoredLaw, Stress};
 use crate::kernel::planar::{PlanarNode, PlanarPoint, flattened, in_one_turn, in_space};
@@ -13,11 +13,12 @@ use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
-/// The planar form of [`BeamElasticity`], with its elements side by side in their order. Elements
-/// whose nodes have turned axes or different charts are added by the effect in space.
-pub struct PlanarElasticity<I> {
+/// The planar form of [`BeamElasticity`](super::beam::BeamElasticity), with its elements side by
+/// side in their order. Elements whose nodes have turned axes or different charts are added by the
+/// effect in space.
+pub struct PlanarElasticity {
     plane: Plane,
-    spatial: Arc<BeamElasticity<I>>,
+    spatial: Arc<dyn SpatialBeams>,
     blocks: ByOrder<ElementBlock<2, 1>, ElementBlock<3, 2>, ElementBlock<4, 3>>,
 }
 
@@ -33,10 +34,10 @@ struct ElementBlock<const N: usize, const G: usize> {
     points: [PlanarPoints<N>; G],
 }
 
-impl<I: Interpolation> PlanarElasticity<I> {
+impl PlanarElasticity {
     /// The planar form of the elements of `spatial`, which lie in `plane`.
-    pub fn new(spatial: Arc<BeamElasticity<I>>, plane: Plane) -> Self {
-        let elements = &spatial.elements;
+    pub(super) fn new(spatial: Arc<dyn SpatialBeams>, plane: Plane) -> Self {
+        let elements = spatial.elements();
         let blocks = ByOrder {
             two: blocks(&elements.two, &plane),
             three: blocks(&elements.three, &plane),
@@ -101,8 +102,8 @@ fn remembered<const G: usize>(memory: &[[f64; 6]], g: usize, plane: &Plane) -> P
 
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-fn add_batch<I: Interpolation, const N: usize, const G: usize>(
-    plane: &Plane,
+fn add_batch<const N: usize, const G: usize>(
+    (spatial, plane): (&dyn SpatialBeams, &Plane),
     blocks: &[ElementBlock<N, G>],
     batch: &[ElasticElement<N, G>],
     first: usize,
@@ -129,8 +130,9 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
         }
         let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
         out.add_planar(plane, first + start, elements.len(), &system, is_mixed, |k, out| {
-            let work = alone.get_or_insert_with(|| workspace(batch));
-            elements[k].add::<I>(first + start + k, stresses_of(memory, start + k), at, stiffness, work, out);
+            let work = alone.get_or_insert_with(|| Workspace::new(N));
+            let own = memory.get((start + k) * G..).unwrap_or_default();
+            spatial.add_one(first + start + k, own, at, stiffness, work, out);
         });
     }
 }
@@ -180,34 +182,34 @@ fn extrapolate_blocks<const N: usize, const G: usize>(
     }
 }
 
-impl<I: Interpolation> PlanarForm for PlanarElasticity<I> {
+impl PlanarForm for PlanarElasticity {
     fn is_symmetric(&self) -> bool {
         true
     }
 
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
-        let elements = &self.spatial.elements;
+        let elements = self.spatial.elements();
         let blocks = &self.blocks;
-        let plane = &self.plane;
         let two = elements.two.len();
         let three = elements.three.len();
         let known = |first: usize| {
-            let points = self.spatial.points_before(first);
+            let points = elements.points_before(first);
             self.spatial.remembered(memory).get(points..).unwrap_or_default()
         };
+        let spatial = (&*self.spatial, &self.plane);
         Instructions::here().run(
             #[inline(always)]
             || {
-                add_batch::<I, 2, 1>(plane, &blocks.two, &elements.two, 0, known(0), at, weights, out);
-                add_batch::<I, 3, 2>(plane, &blocks.three, &elements.three, two, known(two), at, weights, out);
+                add_batch::<2, 1>(spatial, &blocks.two, &elements.two, 0, known(0), at, weights, out);
+                add_batch::<3, 2>(spatial, &blocks.three, &elements.three, two, known(two), at, weights, out);
                 let first = two + three;
-                add_batch::<I, 4, 3>(plane, &blocks.four, &elements.four, first, known(first), at, weights, out);
+                add_batch::<4, 3>(spatial, &blocks.four, &elements.four, first, known(first), at, weights, out);
             },
         );
     }
 
     fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory) {
-        let elements = &self.spatial.elements;
+        let elements = self.spatial.elements();
         let blocks = &self.blocks;
         let plane = &self.plane;
         let (two, rest) = memory.points.split_at_mut(elements.two.len());

@@ -128,7 +128,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     let mut system = ElementSystem::new(2 * N);
     for (k, element) in batch.iter().enumerate() {
         let member = element.member();
-        member.connection.evaluate(at, weights, true, after_displacement, &mut system, &|nodes, weights, out| {
+        member.connection.evaluate(at, weights, true, &after_displacement, &mut system, &|nodes, weights, out| {
             let motion = ElementMotion::new(member, nodes, at);
             let damping =
                 PointDamping { factor: viscosity.factor(), own: viscosity.points::<G>(first + k - starts[G - 1]) };
@@ -208,13 +208,13 @@ impl<const N: usize> ElementMotion<N> {
         scratch_memory: &mut DampingScratch,
         out: &mut ElementSystem,
     ) {
-        let view = I::View::<N, f64>::new(&self.configuration);
+        let view = I::alone(&self.configuration);
         let sum = Stressed { points, stresses: &self.stresses(&view, points, damping) };
         let Workspace { system, scratch } = &mut scratch_memory.element;
-        view.fill(&sum, weights.stiffness, scratch, system);
+        I::fill_alone(&view, &sum, weights.stiffness, scratch, system);
         out.add_system(system, weights.stiffness != 0.0);
         if weights.stiffness != 0.0 || weights.damping != 0.0 {
-            let moving = I::View::<N, Jet>::new(&self.jets());
+            let moving = I::alone(&self.jets());
             for (g, point) in points.iter().enumerate() {
                 let strains = Strains::new(self, &moving, &point.lifted(), &mut scratch_memory.jets);
                 let factor = damping.factor / point.weight;

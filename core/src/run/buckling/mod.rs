@@ -17,6 +17,7 @@ use super::failure::Failure;
 use super::results::{CriticalKind, CriticalLoad, StageResult};
 use super::stage_run::{Analysis, StageRun};
 use super::statics::PathDirection;
+use crate::sorting::sort_by;
 use crate::system::State;
 use crate::warning::WarningKind;
 
@@ -125,7 +126,7 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
             }
         }
         self.stage.counters.work.uncertainty = uncertainty;
-        found.sort_by(|a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
+        sort_by(&mut found, |a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
         self.stage.counters.steps += 1;
         self.stage.give(&StageResult::CriticalLoads(found))
     }

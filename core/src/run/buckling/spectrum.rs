@@ -6,6 +6,7 @@ use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
 use crate::run::statics::PathDirection;
 use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, largest_eigenvalues, mechanism};
+use crate::sorting::sort_by;
 use crate::system::System;
 use crate::tensor::Vec3;
 use nalgebra::Complex;
@@ -56,7 +57,7 @@ pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Fa
     stage.unless_interrupted()?;
     let real = |theta: &&Complex<f64>| theta.norm() > 0.0 && theta.im.abs() <= REAL * theta.norm();
     let mut loads: Vec<f64> = found.iter().filter(real).map(|theta| load + 1.0 / theta.re).collect();
-    loads.sort_by(|a, b| rank(*a, load).total_cmp(&rank(*b, load)));
+    sort_by(&mut loads, |a, b| rank(*a, load).total_cmp(&rank(*b, load)));
     loads.truncate(modes);
     Ok(loads)
 }

@@ -13,6 +13,7 @@ use super::results::{Mode, StageResult};
 use super::stage_run::{Analysis, StageRun, Teller};
 use crate::model::StageError;
 use crate::solve::{Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, mechanism};
+use crate::sorting::sort_by;
 use crate::tensor::Vec3;
 use crate::warning::WarningKind;
 use nalgebra::Complex;
@@ -166,7 +167,7 @@ fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
     let rigid = SmallMotion { exponent: Complex::default(), uncertainty: 0.0, shape: None };
     let mut stable: Vec<SmallMotion> = found.motions.iter().filter(|motion| !grows(motion)).cloned().collect();
     stable.extend(std::iter::repeat_n(rigid, found.rigid));
-    stable.sort_by(|a, b| a.exponent.norm().total_cmp(&b.exponent.norm()));
+    sort_by(&mut stable, |a, b| a.exponent.norm().total_cmp(&b.exponent.norm()));
     stable.truncate(modes);
     let mut all: Vec<SmallMotion> =
         found.motions.iter().filter(|motion| grows(motion)).cloned().chain(stable).collect();
@@ -181,13 +182,13 @@ fn mode(motion: &SmallMotion) -> Mode {
 
 /// By frequency; of equal frequencies the more unstable first.
 fn sort(motions: &mut [SmallMotion]) {
-    motions.sort_by(|a, b| a.exponent.im.total_cmp(&b.exponent.im));
+    sort_by(motions, |a, b| a.exponent.im.total_cmp(&b.exponent.im));
     let mut start = 0;
     for k in 1..=motions.len() {
         let apart = k == motions.len()
             || motions[k].exponent.im - motions[start].exponent.im > SAME_FREQUENCY * motions[k].exponent.im;
         if apart {
-            motions[start..k].sort_by(|a, b| b.exponent.re.total_cmp(&a.exponent.re));
+            sort_by(&mut motions[start..k], |a, b| b.exponent.re.total_cmp(&a.exponent.re));
             start = k;
         }
     }

@@ -4,6 +4,7 @@ use crate::kernel::Weights;
 use crate::model::{Assembly, Model};
 use crate::run::failure::Failure;
 use crate::solve::{MIN_GROWTH_RATIO, Matrices, ModeSearch, SmallMotion, Work, timed};
+use crate::sorting::sort_numbers;
 use crate::system::{State, System};
 use nalgebra::Complex;
 
@@ -219,7 +220,7 @@ fn find_growing(search: &mut ModeSearch, shift: f64, found: &mut Found, unstable
 /// frequency behind them.
 fn is_complete(search: &mut ModeSearch, found: &Found, modes: usize) -> bool {
     let mut omegas: Vec<f64> = found.motions.iter().filter(|motion| !grows(motion)).map(|m| m.exponent.im).collect();
-    omegas.sort_by(f64::total_cmp);
+    sort_numbers(&mut omegas);
     let first = modes.saturating_sub(found.rigid + found.growing()).max(1);
     // The widest gap behind the last mode that is asked for.
     let gaps = (first..omegas.len()).map(|k| (omegas[k] - omegas[k - 1], k));

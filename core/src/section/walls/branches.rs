@@ -6,6 +6,7 @@ use super::strips::{Station, Strips, sort_faces};
 use crate::section::Point;
 use crate::section::error::{SectionError, show};
 use crate::section::outline::distance;
+use crate::sorting::sort_by;
 
 /// The end of a ply of a branch may move by this part of the ply to a bend of the wall that it
 /// meets
@@ -180,7 +181,7 @@ impl Strips {
             }
         }
         for stations in &mut self.stations {
-            stations.sort_by(|a, b| a.part.total_cmp(&b.part));
+            sort_by(stations, |a, b| a.part.total_cmp(&b.part));
         }
         self.check_stems()
     }

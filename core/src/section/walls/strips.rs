@@ -6,6 +6,7 @@ use super::wall::Walls;
 use crate::section::Point;
 use crate::section::error::{SectionError, show};
 use crate::section::mesh::Region;
+use crate::sorting::sort_by;
 
 /// Sine of the turn up to which a round wall continues its neighbour
 const SMOOTH_JOINT: f64 = 1e-6;
@@ -200,7 +201,7 @@ impl Strips {
 
 /// Sorts faces from left to right, with those that are one dropped.
 pub(super) fn sort_faces(faces: &mut Vec<f64>) {
-    faces.sort_by(|a, b| b.total_cmp(a));
+    sort_by(faces, |a, b| b.total_cmp(a));
     let thickness = faces[0] - faces[faces.len() - 1];
     faces.dedup_by(|a, b| (*a - *b).abs() <= SAME_FACE * thickness);
 }
