@@ -637,7 +637,7 @@ const OBSTACLES: [Obstacle; 3] = [
     },
     Obstacle {
         tables: "[section.bar]\nEA = 1e8\nGA = 4e7\nGJ = 1e6\nEI = 1e6\n[[beam]]\nname = 'bar'\nsection = 'bar'\n\
-                 through = ['c', 'd']\nelements = 3\n[[support]]\nat = 'c'\nfix = 'all'\n[[support]]\nat = 'd'\n\
+                 through = ['near', 'far']\nelements = 3\n[[support]]\nat = 'near'\nfix = 'all'\n[[support]]\nat = 'far'\n\
                  fix = 'all'",
         keys: "with = ['bar']\nradius = { w = 0.05, bar = 0.5 }",
     },
@@ -651,8 +651,8 @@ fn dragged(elements: usize, order: usize, obstacle: &Obstacle, shift: f64, frict
 [point]
 a = ["-1.5 + {shift}", 0, 0.5501]
 b = ["1.5 + {shift}", 0, 0.5501]
-c = [0, -0.6, 0]
-d = [0, 0.6, 0]
+near = [0, -0.6, 0]
+far = [0, 0.6, 0]
 [section.s]
 EA = 1e5
 GA = 4e4
