@@ -17,6 +17,8 @@ words! {
         Shear = "shear",
         /// Stretch of the centre line
         Extension = "extension",
+        /// What couples the torsion of sections with their other strains
+        TorsionCoupling = "torsion_coupling",
         /// Dampers of every kind
         Damping = "damping",
         /// Weight

@@ -50,11 +50,19 @@ pub enum SectionCourse {
     },
     /// Another course, so stiff against these of its strains that they vanish
     Rigid(Box<SectionCourse>, [bool; 6]),
+    /// Another course, whose torsion is not coupled with other strains
+    Uncoupled(Box<SectionCourse>),
 }
 
 /// Factor on the stiffness of strains that are switched off, of which a hundredth is left. A much
 /// larger one would need shorter time steps than all else.
 const RIGID: f64 = 1e2;
+
+/// The number of the torsion kappa_1 among the strains of a section.
+const TORSION: usize = 3;
+
+/// Couplings below this part of the geometric mean of both stiffnesses are round-off.
+const ROUND_OFF: f64 = 1e-9;
 
 /// Relative difference of lengths in tables and of beams that is taken for rounding.
 const SAME_LENGTH: f64 = 1e-3;
@@ -86,6 +94,22 @@ impl SectionCourse {
                 let section = course.at(s);
                 let stiffness = stiffened(&section.stiffness, strains);
                 SectionMatrices { stiffness, ..section }
+            }
+            Self::Uncoupled(course) => {
+                let section = course.at(s);
+                let stiffness = without_torsion_coupling(&section.stiffness);
+                SectionMatrices { stiffness, ..section }
+            }
+        }
+    }
+
+    /// True if torsion is coupled with other strains, before `[effects]` takes that out.
+    pub fn couples_torsion(&self) -> bool {
+        match self {
+            Self::Stations { courses, .. } => courses.iter().any(Self::couples_torsion),
+            Self::Uncoupled(course) | Self::Rigid(course, _) => course.couples_torsion(),
+            Self::Uniform(_) | Self::Shaped { .. } | Self::Blended(_) | Self::Placed { .. } => {
+                [0.0, 1.0].into_iter().any(|s| couples_torsion(&self.at(s).stiffness))
             }
         }
     }
@@ -121,11 +145,34 @@ impl SectionCourse {
     pub fn forced(self, effects: &Effects) -> Self {
         let shear = effects.allow(EffectWord::Shear);
         let extension = effects.allow(EffectWord::Extension);
+        let coupled = effects.allow(EffectWord::TorsionCoupling);
+        let course = if coupled { self } else { Self::Uncoupled(Box::new(self)) };
         if shear && extension {
-            return self;
+            return course;
         }
-        Self::Rigid(Box::new(self), [!extension, !shear, !shear, false, false, false])
+        Self::Rigid(Box::new(course), [!extension, !shear, !shear, false, false, false])
     }
+}
+
+/// True if entries of a stiffness that couple torsion with other strains exceed round-off.
+fn couples_torsion(stiffness: &[[f64; 6]; 6]) -> bool {
+    let is_coupled = |k: usize| {
+        let size = libm::sqrt(stiffness[TORSION][TORSION] * stiffness[k][k]);
+        k != TORSION && stiffness[TORSION][k].abs() > ROUND_OFF * size
+    };
+    (0..6).any(is_coupled)
+}
+
+/// A stiffness whose torsion does nothing to other strains, with the same compliance otherwise: a
+/// torque alone and loads without a torque each have the strains of their own kind that they had.
+fn without_torsion_coupling(stiffness: &[[f64; 6]; 6]) -> [[f64; 6]; 6] {
+    let inverse = |matrix: Matrix6<f64>| matrix.cholesky().map(|factor| factor.inverse());
+    let uncoupled = |compliance: Matrix6<f64>| {
+        Matrix6::from_fn(|i, j| if (i == TORSION) == (j == TORSION) { compliance[(i, j)] } else { 0.0 })
+    };
+    let own = Matrix6::from_fn(|i, j| stiffness[i][j]);
+    let Some(found) = inverse(own).and_then(|compliance| inverse(uncoupled(compliance))) else { return *stiffness };
+    std::array::from_fn(|i| std::array::from_fn(|j| found[(i, j)]))
 }
 
 /// A stiffness K that is [`RIGID`] times as stiff against some strains F and has the same compliance

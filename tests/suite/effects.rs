@@ -1,5 +1,6 @@
 //! Effects that are forced off, and the study that takes them out one by one.
 
+use crate::random::Random;
 use beamsim::deck::{self, EffectWord};
 use beamsim::scene;
 use beamsim::study::effects::{EffectStudy, study_effects};
@@ -377,5 +378,37 @@ impl Observer for Loads {
 
     fn warn(&mut self, warning: &Warning) {
         self.warnings.push(warning.message.clone());
+    }
+}
+
+/// A section of which torsion is coupled with all else, without that coupling: torques alone and forces alone each
+/// have the displacements of their own kind that they had, and no others.
+#[test]
+fn torsion_that_is_uncoupled_keeps_its_compliance() {
+    let mut random = Random::new(7);
+    for case in 0..6 {
+        let half: [[f64; 6]; 6] = std::array::from_fn(|_| std::array::from_fn(|_| random.range(-1.0, 1.0)));
+        let entry = |i: usize, j: usize| {
+            (0..6).map(|k| half[i][k] * half[j][k]).sum::<f64>() * 20.0 + if i == j { 40.0 } else { 0.0 }
+        };
+        let rows: Vec<String> =
+            (0..6).map(|i| format!("{:?}", (0..6).map(|j| entry(i.min(j), i.max(j))).collect::<Vec<_>>())).collect();
+        let tip = |load: &str, effects: &str| {
+            let text = cantilever(&format!("{load}{STATIC}[effects]\nlarge_rotations = false\n{effects}"));
+            let section = format!("stiffness = [{}]\n", rows.join(", "));
+            last(
+                &text
+                    .replace("EA = 500\nGA = 60\nGJ = 20\nEI = 40\n", &section)
+                    .replace("rhoA = 1.5\nrhoJ = [0.02, 0.01, 0.01]\n", ""),
+            )
+        };
+        let off = "torsion_coupling = false\n";
+        let torque = "[[load]]\nat = \"tip\"\nmoment = [1e-3, 0, 0]\n";
+        let [with, without] = ["", off].map(|effects| tip(torque, effects));
+        close(without[1].0[0], with[1].0[0], 1e-9);
+        assert!(without[0].norm() < 1e-9 * with[0].norm(), "case {case}: {:?} {:?}", without[0], with[0]);
+        let [with, without] = ["", off].map(|effects| tip(&force(2e-3, 1e-3), effects));
+        assert!((without[0] - with[0]).norm() < 1e-9 * with[0].norm(), "case {case}: {:?} {:?}", without[0], with[0]);
+        assert!(without[1].0[0].abs() < 1e-9 * with[1].norm(), "case {case}: {:?} {:?}", without[1], with[1]);
     }
 }

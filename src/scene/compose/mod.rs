@@ -222,6 +222,9 @@ impl Composer<'_> {
             let off = if word == EffectWord::GeometricStiffness { UNSTRESSED } else { SWITCHED_OFF };
             self.part(word, name, beams, [why, off, "no beams"]);
         }
+        let couples = self.mesh.beams.iter().any(|beam| beam.section.couples_torsion());
+        let why = ["sections couple torsion with other strains", SWITCHED_OFF, "no section couples torsion"];
+        self.part(EffectWord::TorsionCoupling, "torsion coupling", couples, why);
     }
 
     fn elasticity(&mut self) {

@@ -12,6 +12,7 @@ pub(super) fn names(word: EffectWord) -> &'static [&'static str] {
         EffectWord::Gyroscopic => &["gyroscopic forces"],
         EffectWord::Shear => &["shear"],
         EffectWord::Extension => &["extension"],
+        EffectWord::TorsionCoupling => &["torsion coupling"],
         EffectWord::Damping => &[],
         EffectWord::Gravity => &["gravity on beams", "gravity on bodies"],
         EffectWord::FollowerTangent => &["follower tangent"],
