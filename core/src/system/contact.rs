@@ -100,8 +100,12 @@ pub struct PointMemory {
     pub(crate) traction: Vec3,
     /// n0, the normal at the last converged state, in the same axes
     pub(crate) normal: Vec3,
-    /// The direction of the traction at the last converged state if it slid, in the same axes; zero
-    /// otherwise
+    /// h, the factor on the stiffness of stick
+    pub(crate) hardening: f64,
+    /// True if friction was at its limit at the last converged state
+    pub(crate) slides: bool,
+    /// The direction of the traction of a point that slid and has gone on that way, in the same axes;
+    /// zero otherwise
     pub(crate) onward: Vec3,
     /// The gap at which the penalty begins, a length: a dynamic stage begins with the forces of the
     /// static one before
@@ -117,12 +121,12 @@ pub struct PointMemory {
 impl PointMemory {
     /// True if it has a traction and did not slide.
     pub fn sticks(&self) -> bool {
-        self.traction != Vec3::ZERO && self.onward == Vec3::ZERO
+        self.traction != Vec3::ZERO && !self.slides
     }
 
     /// A point that is open now, with the traction of the last converged state; `None` if it had none.
     pub fn opened(&self) -> Option<Self> {
-        (self.traction != Vec3::ZERO).then_some(Self { force: 0.0, multiplier: 0.0, ..*self })
+        (self.traction != Vec3::ZERO).then_some(Self { force: 0.0, multiplier: 0.0, push: Vec3::ZERO, ..*self })
     }
 }
 

@@ -149,7 +149,7 @@ impl<'a> ChainNow<'a> {
     fn memory_of(&self, point: &PointNow, accepts: bool) -> PointMemory {
         let PointNow { candidate, state, law, .. } = point;
         let rotation = &self.carrier.rotation.r;
-        let carried = if accepts { self.laws.carried(law.friction.as_ref(), state) } else { law.carried };
+        let carried = if accepts { self.laws.carried(law.friction.as_ref(), &law.carried, state) } else { law.carried };
         let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
         let gap = state.gap + law.radius - self.chain.radius;
         let force = state.normal_force.force;
@@ -166,6 +166,8 @@ impl<'a> ChainNow<'a> {
             gap,
             traction: carried.force,
             normal: carried.normal,
+            hardening: carried.hardening,
+            slides: carried.slides,
             onward: carried.onward,
             offset: before.map_or(0.0, |before| before.offset),
             steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),

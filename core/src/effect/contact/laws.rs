@@ -1,7 +1,6 @@
 //! The laws of a contact, and bounds that surfaces and pairs of beams share.
 
-use crate::kernel::contact::{CarriedTraction, FrictionLaw, PointState, Status};
-use crate::tensor::Vec3;
+use crate::kernel::contact::{CarriedTraction, FrictionLaw, PointState};
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
@@ -36,16 +35,19 @@ impl ContactLaws {
     /// The memory of friction at an accepted point. A point that barely touches has none: the
     /// direction of its traction is that of round-off. The bound follows the first stiffness, not
     /// that of the last augmentation, which a heavier contact may have raised.
-    pub(super) fn carried(&self, friction: Option<&FrictionLaw>, state: &PointState) -> CarriedTraction {
-        let none = CarriedTraction { normal: state.normal, ..CarriedTraction::default() };
-        let first_stiffness = friction.map_or(0.0, |friction| friction.stiffness / self.stick);
-        if state.normal_force.force <= BARELY_TOUCHING * self.penetration * first_stiffness {
-            return none;
+    pub(super) fn carried(
+        &self,
+        friction: Option<&FrictionLaw>,
+        carried: &CarriedTraction,
+        state: &PointState,
+    ) -> CarriedTraction {
+        let force = state.normal_force.force;
+        match friction {
+            Some(law) if force > BARELY_TOUCHING * self.penetration * law.stiffness / self.stick => {
+                law.to_carry(carried, &state.traction, state.normal, force)
+            }
+            Some(_) | None => CarriedTraction { normal: state.normal, ..CarriedTraction::default() },
         }
-        let force = state.traction.force;
-        let slides = state.status() == Status::Slides;
-        let onward = force.normalized().filter(|_| slides).unwrap_or(Vec3::ZERO);
-        CarriedTraction { force, onward, ..none }
     }
 
     /// The coefficient of friction at a part of the length of a beam.

@@ -156,7 +156,8 @@ impl SurfaceContacts {
             let points = if laws.rubs() { &memory.points[..] } else { &[] };
             for point in points {
                 let element = (point.place as usize).min(chain.elements() - 1);
-                show(chain, point, laws.stick * chain.stiffness[element].first(at.contacts.regime));
+                let first = chain.stiffness[element].first(at.contacts.regime);
+                show(chain, point, laws.stick * first * point.hardening.max(1.0));
             }
         }
     }

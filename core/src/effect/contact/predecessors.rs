@@ -9,7 +9,6 @@
 
 use crate::kernel::contact::CarriedTraction;
 use crate::system::PointMemory;
-use crate::tensor::Vec3;
 
 /// The largest distance, in elements, between the places of a contact in two states.
 pub(super) const LARGEST_SHIFT: f64 = 1.5;
@@ -97,33 +96,26 @@ impl Predecessors {
     pub fn traction<'a>(&self, weight: f64, point: &dyn Fn(usize) -> (&'a PointMemory, f64)) -> CarriedTraction {
         let carried = |number: usize, part: f64| {
             let (point, _) = point(number);
-            let force = point.traction * part;
-            CarriedTraction { force, normal: point.normal, onward: point.onward, goes_on: false }
+            CarriedTraction {
+                force: point.traction * part,
+                normal: point.normal,
+                hardening: point.hardening,
+                slides: point.slides,
+                onward: point.onward,
+                goes_on: false,
+            }
         };
         let own = self.own.map(|number| carried(number, 1.0));
         let merged = self.merged.iter().map(|&number| carried(number, point(number).1 / weight));
-        let beside = || self.beside.map(|number| carried(number, 0.0));
-        own.into_iter().chain(merged).reduce(together).or_else(beside).unwrap_or_default()
+        let beside = || self.beside.map(|number| CarriedTraction { hardening: 1.0, ..carried(number, 0.0) });
+        own.into_iter().chain(merged).reduce(CarriedTraction::with).or_else(beside).unwrap_or_default()
     }
-}
-
-/// Two tractions in one point: the second one is turned to the normal of the first, and lost where
-/// the normals are opposite.
-fn together(a: CarriedTraction, b: CarriedTraction) -> CarriedTraction {
-    if a.force == Vec3::ZERO {
-        return b;
-    }
-    if a.normal.dot(b.normal) <= 0.0 {
-        return a;
-    }
-    let force = a.force + b.carried_to(a.normal);
-    let slides = a.slides() || b.slides();
-    CarriedTraction { force, onward: force.normalized().filter(|_| slides).unwrap_or(Vec3::ZERO), ..a }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tensor::Vec3;
 
     fn link(candidate: usize, point: usize, relation: Relation, shift: f64) -> Link {
         Link { candidate, point, relation, shift }
@@ -162,16 +154,16 @@ mod tests {
     fn tractions_of_merged_points_add_up_on_the_tangent_plane() {
         let [x, y, z] = Vec3::UNIT;
         let tilted = (z + x * 0.1).normalized().unwrap();
-        let memory = [point(x * 2.0, z, false), point((x - z * 0.1).normalized().unwrap(), tilted, true)];
+        let memory = [point(x * 0.25, z, false), point((x - z * 0.1).normalized().unwrap(), tilted, true)];
         let of = |number: usize| (&memory[number], [1.0, 0.5][number]);
         let predecessors = Predecessors { own: Some(0), merged: vec![1], beside: None };
         let both = predecessors.traction(1.0, &of);
-        assert!((both.force - x * 2.5).norm() < 1e-15 && both.normal == z && both.onward == x);
+        assert!((both.force - x * 0.75).norm() < 1e-15 && both.normal == z && both.onward == x);
         // What was never there has no traction, and slides only beside what slides.
         let beside = |number| Predecessors { beside: Some(number), ..Predecessors::default() };
         for (number, is_sliding) in [(0, false), (1, true)] {
             let taken_over = beside(number).traction(1.0, &of);
-            assert_eq!((taken_over.force, taken_over.slides()), (Vec3::ZERO, is_sliding));
+            assert_eq!((taken_over.force, taken_over.goes_onward()), (Vec3::ZERO, is_sliding));
         }
         let turned = [point(x, z, true), point(y, -z, true)];
         let of = |number: usize| (&turned[number], 1.0);

@@ -31,7 +31,7 @@ pub(super) fn resultant(chains: &[Chain], surfaces: &[SceneSurface], number: usi
             sum.force += point.push;
             sum.moment += (point.at - about).cross(point.push);
             sum.points += 1;
-            sum.sliding += usize::from(point.onward != Vec3::ZERO);
+            sum.sliding += usize::from(point.slides);
         }
     }
     sum

@@ -144,7 +144,7 @@ impl PairRole<'_> {
         for point in at.contacts.pairs.points.iter() {
             let laws = self.law_of(point.meeting);
             if laws.rubs() {
-                show(point, now.stick(&now.pair_of(point), laws));
+                show(point, now.stick(&now.pair_of(point), laws) * point.point.hardening.max(1.0));
             }
         }
     }

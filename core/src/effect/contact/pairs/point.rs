@@ -407,7 +407,7 @@ impl<'a> PairsNow<'a> {
         let before = point.partner.filter(|_| is_penalty).map(|before| before.point);
         let carried = if accepts {
             let laws = &self.laws[self.pairs.contact_of(pair.meeting as usize)];
-            laws.carried(law.friction.as_ref(), state).turned(&point.carrier)
+            laws.carried(law.friction.as_ref(), &law.carried, state).turned(&point.carrier)
         } else {
             point.carried
         };
@@ -424,6 +424,8 @@ impl<'a> PairsNow<'a> {
                 gap,
                 traction: carried.force,
                 normal: carried.normal,
+                hardening: carried.hardening,
+                slides: carried.slides,
                 onward: carried.onward,
                 offset: before.map_or(0.0, |before| before.offset),
                 steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),

@@ -277,7 +277,7 @@ impl<'a> PairRole<'a> {
             sum.normal += point.weight * point.point.force;
             sum.friction += point.weight * point.point.traction.norm();
             sum.points += 1;
-            sum.sliding += usize::from(point.point.onward != Vec3::ZERO);
+            sum.sliding += usize::from(point.point.slides);
             if !meeting.is_own() {
                 sum.force += point.point.push;
                 sum.moment += point.point.at.cross(point.point.push);
