@@ -217,7 +217,7 @@ pub trait Interpolation: Send + Sync + 'static {
         Self::View::new(configuration)
     }
 
-    /// [`View::fill`] for a single element; compiled once for all sums.
+    /// `View::fill` for a single element; compiled once for all sums.
     #[inline(never)]
     fn fill_alone<const N: usize>(
         view: &Self::View<N, f64>,
