@@ -121,12 +121,10 @@ pub struct ElasticStick {
 }
 
 impl ElasticStick {
-    /// The softer one of two.
-    pub fn softer(a: Option<Self>, b: Option<Self>) -> Option<Self> {
-        let share = |stick: &Self| stick.way / stick.radius;
-        match (a, b) {
-            (Some(a), Some(b)) => Some(if share(&b) > share(&a) { b } else { a }),
-            (a, b) => a.or(b),
+    /// Puts a point in the place of the softest one so far, if it is softer.
+    pub fn compare(softest: &mut Option<Self>, contact: &str, way: f64, radius: f64) {
+        if softest.as_ref().is_none_or(|known| way / radius > known.way / known.radius) {
+            *softest = Some(Self { contact: contact.into(), way, radius });
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Memory of contacts: what a run takes from one converged state to the next.
 
-use crate::kernel::contact::NodeBefore;
+use crate::kernel::contact::{CarriedTraction, NodeBefore};
 use crate::tensor::Vec3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -95,18 +95,8 @@ pub struct PointMemory {
     pub(crate) multiplier: f64,
     /// g, the gap, a length
     pub(crate) gap: f64,
-    /// t0, the traction at the last converged state, in the axes of the surface; of beams in global
-    /// axes
-    pub(crate) traction: Vec3,
-    /// n0, the normal at the last converged state, in the same axes
-    pub(crate) normal: Vec3,
-    /// h, the factor on the stiffness of stick
-    pub(crate) hardening: f64,
-    /// True if friction was at its limit at the last converged state
-    pub(crate) slides: bool,
-    /// The direction of the traction of a point that slid and has gone on that way, in the same axes;
-    /// zero otherwise
-    pub(crate) onward: Vec3,
+    /// Its friction at the last converged state, in the axes of the surface; of beams in global axes
+    pub(crate) carried: CarriedTraction,
     /// The gap at which the penalty begins, a length: a dynamic stage begins with the forces of the
     /// static one before
     pub(crate) offset: f64,
@@ -121,12 +111,12 @@ pub struct PointMemory {
 impl PointMemory {
     /// True if it has a traction and did not slide.
     pub fn sticks(&self) -> bool {
-        self.traction != Vec3::ZERO && !self.slides
+        self.carried.force != Vec3::ZERO && !self.carried.slides
     }
 
     /// A point that is open now, with the traction of the last converged state; `None` if it had none.
     pub fn opened(&self) -> Option<Self> {
-        (self.traction != Vec3::ZERO).then_some(Self { force: 0.0, multiplier: 0.0, push: Vec3::ZERO, ..*self })
+        (self.carried.force != Vec3::ZERO).then_some(Self { force: 0.0, multiplier: 0.0, push: Vec3::ZERO, ..*self })
     }
 }
 

@@ -164,11 +164,7 @@ impl<'a> ChainNow<'a> {
             force,
             multiplier,
             gap,
-            traction: carried.force,
-            normal: carried.normal,
-            hardening: carried.hardening,
-            slides: carried.slides,
-            onward: carried.onward,
+            carried,
             offset: before.map_or(0.0, |before| before.offset),
             steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
             push: *rotation * state.force(),
@@ -216,6 +212,6 @@ fn sum<const N: usize>(factors: &[f64; N], places: &[Vec3; N]) -> Vec3 {
 impl PointNow<'_> {
     /// The work of friction since the last converged state.
     pub(super) fn friction_work(&self) -> f64 {
-        self.state.traction.work(&self.law.carried, self.state.normal, self.predecessors.is_new())
+        self.state.traction.work(&self.law.carried, self.state.normal)
     }
 }

@@ -145,7 +145,7 @@ impl SurfaceContacts {
     /// The energy of elastic stick of the points in memory.
     fn stick_energy(&self, at: &State) -> f64 {
         let mut energy = 0.0;
-        self.each_spring(at, &mut |_, point, stiffness| energy += point.traction.squared() / (2.0 * stiffness));
+        self.each_spring(at, &mut |_, point, stiffness| energy += point.carried.force.squared() / (2.0 * stiffness));
         energy + self.pairs().stick_energy(at)
     }
 
@@ -157,7 +157,7 @@ impl SurfaceContacts {
             for point in points {
                 let element = (point.place as usize).min(chain.elements() - 1);
                 let first = chain.stiffness[element].first(at.contacts.regime);
-                show(chain, point, laws.stick * first * point.hardening.max(1.0));
+                show(chain, point, laws.stick * first * point.carried.factor());
             }
         }
     }
@@ -524,15 +524,14 @@ impl Contacts for SurfaceContacts {
     }
 
     fn softest_stick(&self, at: &State) -> Option<ElasticStick> {
-        let mut softest = self.pairs().softest_stick(at);
+        let mut softest = None;
         self.each_spring(at, &mut |chain, point, stiffness| {
             if point.sticks() {
-                let contact = self.laws[chain.contact].name.clone();
-                let way = point.traction.norm() / stiffness;
-                let stick = ElasticStick { contact, way, radius: chain.radius };
-                softest = ElasticStick::softer(softest.take(), Some(stick));
+                let way = point.carried.force.norm() / stiffness;
+                ElasticStick::compare(&mut softest, &self.laws[chain.contact].name, way, chain.radius);
             }
         });
+        self.pairs().add_softest_stick(at, &mut softest);
         softest
     }
 

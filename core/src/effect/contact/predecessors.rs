@@ -1,5 +1,5 @@
 //! The points of the last look at a contact that its present candidates were: a candidate takes over
-//! their multipliers and tractions.
+//! the multiplier of one and the tractions of all.
 //!
 //! Candidates come and go where a contact passes to the next element or edge: two points become one,
 //! or a node gives way to a closest point beside it. Normal forces find themselves anew. Friction
@@ -66,16 +66,15 @@ impl Predecessors {
                 is_taken[link.point] = true;
             }
         }
-        if is_taken.contains(&false) || found.iter().any(|predecessors| predecessors.own.is_none()) {
-            links.sort_by(|a, b| a.shift.total_cmp(&b.shift).then(numbers(a).cmp(&numbers(b))));
-            for link in links {
-                let of_candidate = &mut found[link.candidate];
-                if !is_taken[link.point] {
-                    of_candidate.merged.push(link.point);
-                    is_taken[link.point] = true;
-                } else if of_candidate.own.is_none() {
-                    of_candidate.beside = of_candidate.beside.or(Some(link.point));
-                }
+        links.retain(|link| !is_taken[link.point] || found[link.candidate].own.is_none());
+        links.sort_by(|a, b| a.shift.total_cmp(&b.shift).then(numbers(a).cmp(&numbers(b))));
+        for link in links {
+            let of_candidate = &mut found[link.candidate];
+            if !is_taken[link.point] {
+                of_candidate.merged.push(link.point);
+                is_taken[link.point] = true;
+            } else if of_candidate.own.is_none() {
+                of_candidate.beside = of_candidate.beside.or(Some(link.point));
             }
         }
         found
@@ -86,24 +85,12 @@ impl Predecessors {
         self.own.into_iter().chain(self.merged.iter().copied())
     }
 
-    /// True if the candidate was none of the points.
-    pub fn is_new(&self) -> bool {
-        self.own.is_none() && self.merged.is_empty()
-    }
-
     /// The traction that a candidate of this weight takes over. `point` has the memory of a point and
     /// its weight, by its number. Tractions of points that merge add up, turned to the first normal.
     pub fn traction<'a>(&self, weight: f64, point: &dyn Fn(usize) -> (&'a PointMemory, f64)) -> CarriedTraction {
         let carried = |number: usize, part: f64| {
-            let (point, _) = point(number);
-            CarriedTraction {
-                force: point.traction * part,
-                normal: point.normal,
-                hardening: point.hardening,
-                slides: point.slides,
-                onward: point.onward,
-                goes_on: false,
-            }
+            let whole = point(number).0.carried;
+            CarriedTraction { force: whole.force * part, ..whole }
         };
         let own = self.own.map(|number| carried(number, 1.0));
         let merged = self.merged.iter().map(|&number| carried(number, point(number).1 / weight));
@@ -121,9 +108,10 @@ mod tests {
         Link { candidate, point, relation, shift }
     }
 
-    fn point(traction: Vec3, normal: Vec3, slides: bool) -> PointMemory {
-        let onward = if slides { traction.normalized().unwrap() } else { Vec3::ZERO };
-        PointMemory { traction, normal, onward, ..PointMemory::default() }
+    fn point(force: Vec3, normal: Vec3, slides: bool) -> PointMemory {
+        let onward = if slides { force.normalized().unwrap() } else { Vec3::ZERO };
+        let carried = CarriedTraction { force, normal, onward, ..CarriedTraction::default() };
+        PointMemory { carried, ..PointMemory::default() }
     }
 
     #[test]

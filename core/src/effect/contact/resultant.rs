@@ -27,11 +27,11 @@ pub(super) fn resultant(chains: &[Chain], surfaces: &[SceneSurface], number: usi
         sum.gap = sum.gap.min(chain.least_gap(&surface.surface, &carrier, at));
         for point in points(k, at) {
             sum.normal += point.force;
-            sum.friction += point.traction.norm();
+            sum.friction += point.carried.force.norm();
             sum.force += point.push;
             sum.moment += (point.at - about).cross(point.push);
             sum.points += 1;
-            sum.sliding += usize::from(point.slides);
+            sum.sliding += usize::from(point.carried.slides);
         }
     }
     sum
@@ -81,5 +81,5 @@ fn place_and_force(chain: &Chain, points: &[PointMemory], number: Option<usize>)
         None => (points.last().filter(|_| chain.is_closed())?, -round),
     };
     let share = chain.share(point.place);
-    Some((point.place + shift, [point.force / share, point.traction.norm() / share]))
+    Some((point.place + shift, [point.force / share, point.carried.force.norm() / share]))
 }

@@ -35,6 +35,7 @@
 
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// Normals that turn by more than 120 degrees between converged states: 1 + n0.n is below this.
 const MIN_NORMAL_COSINE: f64 = 0.5;
@@ -55,7 +56,7 @@ pub struct FrictionLaw {
 }
 
 /// The traction of a contact at the last converged state. A contact that was open has none.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct CarriedTraction {
     /// t0, force on the first party, in the axes of the carrier at that state
     pub(crate) force: Vec3,
@@ -129,7 +130,7 @@ struct Turn<T> {
 
 /// A turned vector with its derivative over n.
 #[derive(Clone, Copy)]
-struct Turned<T> {
+struct TurnedVector<T> {
     value: Vec3<T>,
     over_normal: Mat3<T>,
 }
@@ -140,13 +141,13 @@ impl<T: Real> Turn<T> {
         Self { n0, n, cosine: T::one() + n0.dot(n) }
     }
 
-    fn of(&self, vector: Vec3) -> Turned<T> {
+    fn of(&self, vector: Vec3) -> TurnedVector<T> {
         let Self { n0, n, cosine } = *self;
         let vector = Vec3::constant(vector);
         let s = T::one() / cosine;
         let lift = n.dot(vector) * s;
         let by_normal = (n0 + n).outer(vector * s - n0 * (lift * s)) + Mat3::identity() * lift;
-        Turned { value: vector - (n0 + n) * lift, over_normal: -by_normal }
+        TurnedVector { value: vector - (n0 + n) * lift, over_normal: -by_normal }
     }
 }
 
@@ -200,11 +201,9 @@ impl<T: Real> Traction<T> {
 
 impl Traction {
     /// The work of friction since the last converged state: that of the mean of both tractions over
-    /// the sliding; negative where friction takes energy. A contact `is_new` that began in between:
-    /// its traction rose from zero, whatever it took over.
-    pub fn work(&self, carried: &CarriedTraction, n: Vec3, is_new: bool) -> f64 {
-        let before = if is_new { Vec3::ZERO } else { carried.carried_to(n) };
-        (self.force + before).dot(self.sliding) * 0.5
+    /// the sliding; negative where friction takes energy.
+    pub fn work(&self, carried: &CarriedTraction, n: Vec3) -> f64 {
+        (self.force + carried.carried_to(n)).dot(self.sliding) * 0.5
     }
 }
 
@@ -283,7 +282,14 @@ impl FrictionLaw {
     }
 
     /// Adds e1 (mu p - |t0|) min(1, f/d) to a traction. `before`: |t0|.
-    fn add_onward<T: Real>(&self, e1: Turned<T>, before: f64, p: T, [n, a]: [Vec3<T>; 2], trial: &mut Traction<T>) {
+    fn add_onward<T: Real>(
+        &self,
+        e1: TurnedVector<T>,
+        before: f64,
+        p: T,
+        [n, a]: [Vec3<T>; 2],
+        trial: &mut Traction<T>,
+    ) {
         let direction = e1.value;
         let limit = p * self.coefficient;
         let way = -direction.dot(trial.sliding);

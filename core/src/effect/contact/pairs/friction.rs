@@ -107,7 +107,7 @@ impl PairRole<'_> {
         if self.rubs() {
             self.now(at).each_point(Weights::NONE, &mut |point, _| {
                 let traction = &point.state.traction;
-                let of_point = traction.work(&point.law.carried, point.state.normal, point.predecessors.is_new());
+                let of_point = traction.work(&point.law.carried, point.state.normal);
                 work += point.candidate.weight * of_point;
             });
         }
@@ -118,24 +118,20 @@ impl PairRole<'_> {
     pub(in crate::effect::contact) fn stick_energy(self, at: &State) -> f64 {
         let mut energy = 0.0;
         self.each_spring(at, &mut |point, stiffness| {
-            energy += point.weight * point.point.traction.squared() / (2.0 * stiffness);
+            energy += point.weight * point.point.carried.force.squared() / (2.0 * stiffness);
         });
         energy
     }
 
-    /// The point that sticks by the longest way of its spring, over the smaller radius.
-    pub(in crate::effect::contact) fn softest_stick(self, at: &State) -> Option<ElasticStick> {
-        let mut softest = None;
+    /// Compares the points that stick with the softest one so far, by the smaller radius of both beams.
+    pub(in crate::effect::contact) fn add_softest_stick(self, at: &State, softest: &mut Option<ElasticStick>) {
         self.each_spring(at, &mut |point, stiffness| {
             if point.point.sticks() {
                 let [a, b] = self.pairs.both(point.meeting as usize);
-                let contact = self.law_of(point.meeting).name.clone();
-                let way = point.point.traction.norm() / stiffness;
-                let stick = ElasticStick { contact, way, radius: a.radius.min(b.radius) };
-                softest = ElasticStick::softer(softest.take(), Some(stick));
+                let way = point.point.carried.force.norm() / stiffness;
+                ElasticStick::compare(softest, &self.law_of(point.meeting).name, way, a.radius.min(b.radius));
             }
         });
-        softest
     }
 
     /// Shows the points in memory of contacts with friction, with the stiffness K_t of stick.
@@ -144,7 +140,7 @@ impl PairRole<'_> {
         for point in at.contacts.pairs.points.iter() {
             let laws = self.law_of(point.meeting);
             if laws.rubs() {
-                show(point, now.stick(&now.pair_of(point), laws) * point.point.hardening.max(1.0));
+                show(point, now.stick(&now.pair_of(point), laws) * point.point.carried.factor());
             }
         }
     }

@@ -275,9 +275,9 @@ impl<'a> PairRole<'a> {
             let meeting = &self.pairs.meetings[point.meeting as usize];
             let [first, _] = self.pairs.both(point.meeting as usize);
             sum.normal += point.weight * point.point.force;
-            sum.friction += point.weight * point.point.traction.norm();
+            sum.friction += point.weight * point.point.carried.force.norm();
             sum.points += 1;
-            sum.sliding += usize::from(point.point.slides);
+            sum.sliding += usize::from(point.point.carried.slides);
             if !meeting.is_own() {
                 sum.force += point.point.push;
                 sum.moment += point.point.at.cross(point.point.push);
@@ -321,7 +321,7 @@ impl<'a> PairRole<'a> {
                 if strands[side] == number {
                     let near = (1.0 - order * strand.shift(place, node / order)).max(0.0);
                     forces[0] += point.weight * point.point.force * near;
-                    forces[1] += point.weight * point.point.traction.norm() * near;
+                    forces[1] += point.weight * point.point.carried.force.norm() * near;
                 }
             }
         }
