@@ -721,3 +721,141 @@ fn sliding_goes_on_from_element_to_element() {
         assert!(least > 0.999, "case {case}: {elements} elements of order {order}, obstacle {number}: {least}");
     }
 }
+
+/// A beam on a plane, pressed by `weight`, whose end is dragged along it by `way`.
+struct DraggedOnPlane {
+    elements: usize,
+    order: usize,
+    bending: f64,
+    weight: f64,
+    load: &'static str,
+    friction: f64,
+    stick: f64,
+    radius: f64,
+    end: &'static str,
+    way: f64,
+    steps: usize,
+}
+
+impl DraggedOnPlane {
+    fn deck(&self) -> String {
+        let Self { elements, order, bending, weight, friction, stick, radius, end, way, steps, .. } = self;
+        let loads = match self.load {
+            "ends" => {
+                ["a", "b"].map(|at| format!("[[load]]\nat = \"{at}\"\nforce = [0, 0, {}]\n", -weight / 2.0)).concat()
+            }
+            _ => format!("[[load]]\nalong = \"w\"\nforce = [0, 0, {}]\n", -weight),
+        };
+        format!(
+            r#"
+[point]
+a = [0, 0, {radius}]
+b = [1, 0, {radius}]
+[section.s]
+EA = {axial}
+GA = {axial}
+GJ = {bending}
+EI = {bending}
+[[beam]]
+name = "w"
+section = "s"
+through = ["a", "b"]
+elements = {elements}
+order = {order}
+[[support]]
+at = "{end}"
+fix = ["uy", "rx", "rz"]
+[[support]]
+at = "{end}"
+fix = ["ux"]
+stages = [1]
+[[motion]]
+at = "{end}"
+ux = {way}
+stages = [2]
+{loads}
+[[surface]]
+name = "g"
+kind = "plane"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+[[contact]]
+name = "c"
+beams = ["w"]
+surfaces = ["g"]
+radius = {radius}
+friction = {friction}
+stick = {stick}
+[[stage]]
+kind = "static"
+steps = 4
+[[stage]]
+kind = "static"
+steps = {steps}
+[output]
+nodes = ["a", "b"]
+columns = ["reaction", "contact", "energy"]
+"#,
+            axial = 1e4 * bending
+        )
+    }
+}
+
+/// Friction on a beam that is dragged is mu N against the motion, whatever the load, the stiffness of the beam, the
+/// mesh, the levels and `stick`; and what the motion gives is what friction takes and the beam stores.
+#[test]
+fn beams_dragged_over_a_plane_feel_all_friction() {
+    let mut random = Random::new(77);
+    for case in 0..36 {
+        let power = |random: &mut Random, from: f64, to: f64| 10f64.powf(random.range(from, to));
+        let weight = power(&mut random, 0.5, 3.0);
+        let way = power(&mut random, -2.0, -0.7);
+        let scene = DraggedOnPlane {
+            elements: 2 + random.range(0.0, 11.0) as usize,
+            order: 1 + case % 3,
+            bending: weight * power(&mut random, -1.0, 2.0),
+            weight,
+            load: ["ends", "line"][case / 3 % 2],
+            friction: random.range(0.1, 0.7),
+            stick: [1.0, 1e-2, 1e2, 1e4][case % 4],
+            radius: power(&mut random, -2.5, -1.5),
+            end: ["a", "b"][case / 2 % 2],
+            way: if case % 5 < 3 { way } else { -way },
+            steps: [1, 3, 30][case / 9 % 3],
+        };
+        let simulation = simulate(&scene.deck());
+        let force = -simulation.end("c.fx") * scene.way.signum() / (scene.friction * scene.weight);
+        assert!((force - 1.0).abs() < 1e-3, "case {case}: {force} of mu N");
+        let [total, taken] = ["energy.total", "energy.friction"].map(|name| simulation.end(name));
+        assert!(total.abs() < 0.1 * taken, "case {case}: {total} of {taken}");
+    }
+}
+
+/// A beam that only its weight holds on a plane loses almost all of that weight, in any number of levels.
+#[test]
+fn beams_held_by_their_weight_are_unloaded() {
+    let mut random = Random::new(78);
+    for case in 0..24 {
+        let power = |random: &mut Random, from: f64, to: f64| 10f64.powf(random.range(from, to));
+        let weight = power(&mut random, 0.5, 3.0);
+        let rest = [0.01, 0.1, 0.9][case % 3];
+        let scene = DraggedOnPlane {
+            elements: 1 + random.range(0.0, 8.0) as usize,
+            order: 1 + case / 3 % 3,
+            bending: weight * power(&mut random, -1.0, 2.0),
+            weight,
+            load: "line",
+            friction: [0.0, 0.3][case % 2],
+            stick: 1.0,
+            radius: power(&mut random, -2.5, -1.5),
+            end: "a",
+            way: 0.0,
+            steps: [1, 2, 5][case / 2 % 3],
+        };
+        let load = format!("force = [0, 0, {}]\n", -weight);
+        let less =
+            format!("{load}stages = [1]\n[[load]]\nalong = \"w\"\nforce = [0, 0, {}]\nstages = [2]\n", -weight * rest);
+        let normal = simulate(&scene.deck().replace(&load, &less)).end("c.normal");
+        assert!((normal / (rest * weight) - 1.0).abs() < 1e-3, "case {case}: {normal} for {}", rest * weight);
+    }
+}

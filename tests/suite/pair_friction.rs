@@ -156,7 +156,7 @@ fn levels_that_are_cut_give_the_answer_of_small_levels() {
     let dragged = Dragged { friction: 0.3, steps: 64, ..Dragged::random(&mut random) };
     let small = simulate(&dragged.deck());
     // Few corrections are allowed: levels are halved.
-    let cut = [5, 4, 3].map(|most| {
+    let cut = [8, 7, 6, 5, 4, 3].map(|most| {
         let keys = format!("max_iterations = {most}");
         attempt(&Dragged { steps: 4, keys: keys.leak(), ..dragged.clone() }.deck())
     });

@@ -5,6 +5,17 @@ use crate::tensor::Vec3;
 
 /// The role of contacts, whose memory is [`State::contacts`].
 pub trait Contacts {
+    /// True if some contact has friction.
+    fn rubs(&self) -> bool;
+
+    /// The work of friction since the last accepted state, which the memory of a state still tells;
+    /// negative where friction takes energy.
+    fn friction_work(&self, at: &State) -> f64;
+
+    /// The factors on the stiffness of stick, by the numbers of contacts, with which the springs of all
+    /// points reach the limit of friction within the allowed part of the element or the radius.
+    fn needed_stick_factors(&self, at: &State) -> Vec<f64>;
+
     /// Penetrations and changes of a balanced state.
     fn survey(&self, at: &State) -> ContactSurvey;
 

@@ -24,6 +24,13 @@ pub struct ContactMemory {
     pub(crate) first_factor: f64,
     /// Present factor on the first stiffness of contacts
     pub(crate) factor: f64,
+    /// Factors on the stiffness of stick with which load levels end, by the numbers of contacts; 1 for
+    /// those that are not there
+    pub(crate) full_stick_factors: Vec<f64>,
+    /// The part of the stiffness of stick that acts at present in static stages
+    pub(crate) stick_part: f64,
+    /// True if the tangent has a stiffness against sliding and opening, which contacts have not
+    pub(crate) resists: bool,
     /// True if points that slid go on sliding in the first tangent of a level
     pub(crate) goes_on: bool,
     /// Energy that friction and damping of contacts have taken since the start of the run
@@ -49,6 +56,9 @@ impl Default for ContactMemory {
             regime: ContactRegime::Augmented,
             first_factor: 1.0,
             factor: 1.0,
+            full_stick_factors: Vec::new(),
+            stick_part: 1.0,
+            resists: false,
             goes_on: true,
             dissipated: 0.0,
             damping_power: 0.0,
@@ -62,6 +72,11 @@ impl Default for ContactMemory {
 }
 
 impl ContactMemory {
+    /// The factor on the stiffness of stick with which load levels end, of a contact by its number.
+    pub fn full_stick_factor(&self, contact: usize) -> f64 {
+        self.full_stick_factors.get(contact).copied().unwrap_or(1.0)
+    }
+
     /// True if some point has a force.
     pub fn touches(&self) -> bool {
         let has_force = |point: &PointMemory| point.force > 0.0;

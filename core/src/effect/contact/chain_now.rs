@@ -1,13 +1,11 @@
 //! A beam or a body against one surface in a state: its contact points with their forces.
 
 use super::chain::{Candidate, Chain, shape};
-use super::laws::{ContactLaws, TOUCHING};
+use super::laws::ContactLaws;
 use super::predecessors::Predecessors;
 use super::strand::ChainNode;
 use super::surface::{SceneSurface, SurfaceCarrier};
-use crate::kernel::contact::{
-    CarriedTraction, Carrier, ContactLaw, ContactNode, FrictionLaw, NodeBefore, NormalLaw, PointState, add_point,
-};
+use crate::kernel::contact::{Carrier, ContactLaw, ContactNode, NodeBefore, NormalLaw, PointState, add_point};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
 use crate::system::{ChainMemory, ContactRegime, PointMemory, Slot, State};
@@ -127,18 +125,16 @@ impl<'a> ChainNow<'a> {
         let stiffness = self.chain.stiffness[candidate.element];
         let first = stiffness.first(contacts.regime);
         let normal = match contacts.regime {
-            ContactRegime::Augmented => NormalLaw::Augmented {
-                multiplier: partner.map_or(0.0, |point| point.multiplier),
-                stiffness: first * contacts.factor,
-                touching: TOUCHING * self.laws.penetration,
-            },
+            ContactRegime::Augmented => {
+                let multiplier = partner.map_or(0.0, |point| point.multiplier);
+                self.laws.augmented(multiplier, &stiffness, contacts)
+            }
             ContactRegime::Penalty => NormalLaw::Penalty { stiffness: first, damping: self.laws.damping, toe: 0.0 },
         };
         let coefficient = self.laws.friction_at(self.chain.fraction(candidate));
-        let friction = (coefficient > 0.0).then_some(FrictionLaw { coefficient, stiffness: self.laws.stick * first });
+        let friction = self.laws.friction(self.chain.contact, coefficient, &stiffness, contacts);
         let points = self.memory.map_or(&[][..], |memory| &memory.points);
         let carried = predecessors.traction(1.0, &|number| (&points[number], 1.0));
-        let carried = CarriedTraction { goes_on: contacts.goes_on, ..carried };
         let is_penalty = contacts.regime == ContactRegime::Penalty;
         let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.offset);
         ContactLaw { radius: self.chain.radius + offset, normal, friction, carried, place: candidate.place }
@@ -149,13 +145,15 @@ impl<'a> ChainNow<'a> {
     fn memory_of(&self, point: &PointNow, accepts: bool) -> PointMemory {
         let PointNow { candidate, state, law, .. } = point;
         let rotation = &self.carrier.rotation.r;
-        let carried = if accepts { self.laws.carried(law.friction.as_ref(), &law.carried, state) } else { law.carried };
+        let stiffness = &self.chain.stiffness[candidate.element];
+        let first = stiffness.first(self.at.contacts.regime);
+        let carried = if accepts { self.laws.carried(law.friction.is_some(), first, state) } else { law.carried };
         let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
         let gap = state.gap + law.radius - self.chain.radius;
         let force = state.normal_force.force;
         // The next level begins with the first stiffness.
-        let first = self.chain.stiffness[candidate.element].augmented * self.at.contacts.first_factor;
-        let multiplier = if accepts { force + first * gap } else { force };
+        let next = stiffness.augmented * self.at.contacts.first_factor;
+        let multiplier = if accepts { force + next * gap } else { force };
         let is_penalty = self.at.contacts.regime == ContactRegime::Penalty;
         let before = point.partner.filter(|_| is_penalty);
         PointMemory {
@@ -183,6 +181,15 @@ impl<'a> ChainNow<'a> {
             [a, b, c, d, ..] => sum(&shape::<4>(candidate).values, &[*a, *b, *c, *d]),
             [] => Vec3::ZERO,
         }
+    }
+
+    /// The factor on the stiffness of stick that a point needs.
+    pub(super) fn needed_stick_factor(&self, point: &PointNow) -> f64 {
+        let Some(law) = &point.law.friction else { return 0.0 };
+        let limit = law.coefficient * point.state.normal_force.force;
+        let element = point.candidate.element;
+        let length = self.chain.element_length(element);
+        self.laws.needed_stick_factor(limit, &self.chain.stiffness[element], length, self.chain.radius)
     }
 
     /// Energy per time that the damping of a point takes: p_el c (dg/dt)^2.

@@ -1,6 +1,8 @@
 //! The laws of a contact, and bounds that surfaces and pairs of beams share.
 
-use crate::kernel::contact::{CarriedTraction, FrictionLaw, PointState};
+use super::strand::ContactStiffness;
+use crate::kernel::contact::{CarriedTraction, FrictionLaw, NormalLaw, PointState, Status};
+use crate::system::{ContactMemory, ContactRegime};
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
@@ -13,6 +15,16 @@ pub(super) const ROUNDED: f64 = 1.01;
 
 /// Forces below this part of the largest need no small gap.
 pub(super) const RELEVANT_FORCE: f64 = 1e-6;
+
+/// The way on which the spring of a point in a static stage reaches the limit of friction, over the
+/// length of its element. The larger one of this way and the next holds.
+const WAY_OVER_LENGTH: f64 = 0.005;
+
+/// That way over the radius
+const WAY_OVER_RADIUS: f64 = 0.01;
+
+/// The largest stiffness of stick over normal stiffness with which a static stage begins.
+const LARGEST_STICK: f64 = 10.0;
 
 /// The laws of a contact.
 #[derive(Clone, Debug)]
@@ -32,22 +44,71 @@ pub struct ContactLaws {
 }
 
 impl ContactLaws {
-    /// The memory of friction at an accepted point. A point that barely touches has none: the
-    /// direction of its traction is that of round-off. The bound follows the first stiffness, not
-    /// that of the last augmentation, which a heavier contact may have raised.
-    pub(super) fn carried(
-        &self,
-        friction: Option<&FrictionLaw>,
-        carried: &CarriedTraction,
-        state: &PointState,
-    ) -> CarriedTraction {
-        let force = state.normal_force.force;
-        match friction {
-            Some(law) if force > BARELY_TOUCHING * self.penetration * law.stiffness / self.stick => {
-                law.to_carry(carried, &state.traction, state.normal, force)
-            }
-            Some(_) | None => CarriedTraction { normal: state.normal, ..CarriedTraction::default() },
+    /// The memory of friction at an accepted point of a contact whose first stiffness is `first`. A
+    /// point that barely touches has none: the direction of its traction is that of round-off.
+    pub(super) fn carried(&self, has_friction: bool, first: f64, state: &PointState) -> CarriedTraction {
+        let PointState { normal, traction, .. } = *state;
+        if has_friction && state.normal_force.force > BARELY_TOUCHING * self.penetration * first {
+            CarriedTraction { force: traction.force, normal, slides: traction.status == Status::Slides }
+        } else {
+            CarriedTraction { normal, ..CarriedTraction::default() }
         }
+    }
+
+    /// Coulomb's law in a state, at a point of the contact `number` with this coefficient and stiffness.
+    pub(super) fn friction(
+        &self,
+        number: usize,
+        coefficient: f64,
+        stiffness: &ContactStiffness,
+        contacts: &ContactMemory,
+    ) -> Option<FrictionLaw> {
+        (coefficient > 0.0).then(|| FrictionLaw {
+            coefficient,
+            stiffness: self.stick_stiffness(number, stiffness, contacts),
+            resistance: if contacts.resists { stiffness.augmented } else { 0.0 },
+            goes_on: contacts.goes_on,
+        })
+    }
+
+    /// The law of normal forces of a static stage at a point with this multiplier and stiffness. Where
+    /// the tangent resists, a point that had a force has the tangent of a contact even if it opens.
+    pub(super) fn augmented(
+        &self,
+        multiplier: f64,
+        stiffness: &ContactStiffness,
+        contacts: &ContactMemory,
+    ) -> NormalLaw {
+        let holds = contacts.resists && multiplier > 0.0;
+        NormalLaw::Augmented {
+            multiplier,
+            stiffness: stiffness.augmented * contacts.factor,
+            touching: if holds { f64::INFINITY } else { TOUCHING * self.penetration },
+        }
+    }
+
+    /// K_t of the contact `number` in a state.
+    pub(super) fn stick_stiffness(&self, number: usize, stiffness: &ContactStiffness, contacts: &ContactMemory) -> f64 {
+        match contacts.regime {
+            ContactRegime::Augmented => {
+                let factor = contacts.full_stick_factor(number) * contacts.stick_part;
+                self.stick.min(LARGEST_STICK) * stiffness.augmented * factor
+            }
+            ContactRegime::Penalty => self.stick * stiffness.penalty,
+        }
+    }
+
+    /// The factor on the stiffness of stick with which the spring of a point reaches the limit mu p
+    /// within the allowed way. `length`: of the element.
+    pub(super) fn needed_stick_factor(
+        &self,
+        limit: f64,
+        stiffness: &ContactStiffness,
+        length: f64,
+        radius: f64,
+    ) -> f64 {
+        let way = (WAY_OVER_LENGTH * length).max(WAY_OVER_RADIUS * radius);
+        limit / (self.stick.min(LARGEST_STICK) * stiffness.augmented * way)
     }
 
     /// The coefficient of friction at a part of the length of a beam.

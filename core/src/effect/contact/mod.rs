@@ -124,24 +124,6 @@ impl SurfaceContacts {
         self.pairs().remember(at, accepts);
     }
 
-    /// True if some contact has friction.
-    fn rubs(&self) -> bool {
-        self.laws.iter().any(ContactLaws::rubs)
-    }
-
-    /// The work of friction since the last converged state, which the memory of a state still tells;
-    /// negative where friction takes energy.
-    fn friction_work(&self, at: &State) -> f64 {
-        let mut work = 0.0;
-        if self.rubs() {
-            self.each_chain(at, Weights::NONE, &mut |_, chain| {
-                chain.each_point(Weights::NONE, &mut |point, _| work += point.friction_work());
-            });
-            work += self.pairs().friction_work(at);
-        }
-        work
-    }
-
     /// The energy of elastic stick of the points in memory.
     fn stick_energy(&self, at: &State) -> f64 {
         let mut energy = 0.0;
@@ -156,8 +138,7 @@ impl SurfaceContacts {
             let points = if laws.rubs() { &memory.points[..] } else { &[] };
             for point in points {
                 let element = (point.place as usize).min(chain.elements() - 1);
-                let first = chain.stiffness[element].first(at.contacts.regime);
-                show(chain, point, laws.stick * first * point.carried.factor());
+                show(chain, point, laws.stick_stiffness(chain.contact, &chain.stiffness[element], &at.contacts));
             }
         }
     }
@@ -346,6 +327,35 @@ impl DrivenCoordinates for SurfaceContacts {
 }
 
 impl Contacts for SurfaceContacts {
+    fn rubs(&self) -> bool {
+        self.laws.iter().any(ContactLaws::rubs)
+    }
+
+    fn friction_work(&self, at: &State) -> f64 {
+        let mut work = 0.0;
+        if self.rubs() {
+            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+                chain.each_point(Weights::NONE, &mut |point, _| work += point.friction_work());
+            });
+            work += self.pairs().friction_work(at);
+        }
+        work
+    }
+
+    fn needed_stick_factors(&self, at: &State) -> Vec<f64> {
+        let mut needed = vec![0.0; self.laws.len()];
+        if self.rubs() {
+            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+                let of_contact: &mut f64 = &mut needed[chain.chain.contact];
+                chain.each_point(Weights::NONE, &mut |point, _| {
+                    *of_contact = of_contact.max(chain.needed_stick_factor(point));
+                });
+            });
+            self.pairs().add_needed_stick_factors(at, &mut needed);
+        }
+        needed
+    }
+
     fn survey(&self, at: &State) -> ContactSurvey {
         let mut out = ContactSurvey::default();
         let mut largest_force = 0.0f64;

@@ -4,8 +4,7 @@
 //! Candidates come and go where a contact passes to the next element or edge: two points become one,
 //! or a node gives way to a closest point beside it. Normal forces find themselves anew. Friction
 //! cannot: it follows from the past. So a point that has no successor leaves its traction to the
-//! nearest candidate, and one that touches for the first time beside a sliding point slides as that
-//! does.
+//! nearest candidate.
 
 use crate::kernel::contact::CarriedTraction;
 use crate::system::PointMemory;
@@ -45,8 +44,6 @@ pub(super) struct Predecessors {
     pub(super) own: Option<usize>,
     /// Numbers of points without a successor of their own that are nearest to it
     pub(super) merged: Vec<usize>,
-    /// Number of the nearest point, of a candidate that was none
-    beside: Option<usize>,
 }
 
 impl Predecessors {
@@ -66,15 +63,12 @@ impl Predecessors {
                 is_taken[link.point] = true;
             }
         }
-        links.retain(|link| !is_taken[link.point] || found[link.candidate].own.is_none());
+        links.retain(|link| !is_taken[link.point]);
         links.sort_by(|a, b| a.shift.total_cmp(&b.shift).then(numbers(a).cmp(&numbers(b))));
         for link in links {
-            let of_candidate = &mut found[link.candidate];
             if !is_taken[link.point] {
-                of_candidate.merged.push(link.point);
+                found[link.candidate].merged.push(link.point);
                 is_taken[link.point] = true;
-            } else if of_candidate.own.is_none() {
-                of_candidate.beside = of_candidate.beside.or(Some(link.point));
             }
         }
         found
@@ -94,8 +88,7 @@ impl Predecessors {
         };
         let own = self.own.map(|number| carried(number, 1.0));
         let merged = self.merged.iter().map(|&number| carried(number, point(number).1 / weight));
-        let beside = || self.beside.map(|number| CarriedTraction { hardening: 1.0, ..carried(number, 0.0) });
-        own.into_iter().chain(merged).reduce(CarriedTraction::with).or_else(beside).unwrap_or_default()
+        own.into_iter().chain(merged).reduce(CarriedTraction::with).unwrap_or_default()
     }
 }
 
@@ -109,8 +102,7 @@ mod tests {
     }
 
     fn point(force: Vec3, normal: Vec3, slides: bool) -> PointMemory {
-        let onward = if slides { force.normalized().unwrap() } else { Vec3::ZERO };
-        let carried = CarriedTraction { force, normal, onward, ..CarriedTraction::default() };
+        let carried = CarriedTraction { force, normal, slides };
         PointMemory { carried, ..PointMemory::default() }
     }
 
@@ -122,7 +114,6 @@ mod tests {
         let found = Predecessors::of(vec![same(0, 0, 0.4), same(1, 0, 0.3), other(1, 1, 0.1), other(2, 1, 0.5)], 3, 2);
         assert_eq!(found.iter().map(|p| p.own).collect::<Vec<_>>(), [None, Some(0), Some(1)]);
         assert!(found.iter().all(|p| p.merged.is_empty()));
-        assert_eq!(found[0].beside, Some(0));
     }
 
     #[test]
@@ -144,16 +135,10 @@ mod tests {
         let tilted = (z + x * 0.1).normalized().unwrap();
         let memory = [point(x * 0.25, z, false), point((x - z * 0.1).normalized().unwrap(), tilted, true)];
         let of = |number: usize| (&memory[number], [1.0, 0.5][number]);
-        let predecessors = Predecessors { own: Some(0), merged: vec![1], beside: None };
+        let predecessors = Predecessors { own: Some(0), merged: vec![1] };
         let both = predecessors.traction(1.0, &of);
         assert!((both.force - x * 0.75).norm() < 1e-15 && both.normal == z);
-        assert!((both.onward - x).norm() < 1e-15, "{:?}", both.onward);
-        // What was never there has no traction, and slides only beside what slides.
-        let beside = |number| Predecessors { beside: Some(number), ..Predecessors::default() };
-        for (number, is_sliding) in [(0, false), (1, true)] {
-            let taken_over = beside(number).traction(1.0, &of);
-            assert_eq!((taken_over.force, taken_over.goes_onward()), (Vec3::ZERO, is_sliding));
-        }
+        assert!(!both.slides);
         let turned = [point(x, z, true), point(y, -z, true)];
         let of = |number: usize| (&turned[number], 1.0);
         assert_eq!(predecessors.traction(1.0, &of).force, x);

@@ -65,6 +65,12 @@ impl Strand {
         self.order > 0 && self.nodes[0].node.u == self.nodes[self.nodes.len() - 1].node.u
     }
 
+    /// The length of element `k`; zero for a body.
+    pub(super) fn element_length(&self, k: usize) -> f64 {
+        let nodes = self.nodes_of(k);
+        self.length * (nodes[nodes.len() - 1].fraction - nodes[0].fraction)
+    }
+
     /// The distance along the beam of two places, in elements; of a ring the shorter way round.
     pub(super) fn shift(&self, a: f64, b: f64) -> f64 {
         let direct = (a - b).abs();

@@ -123,6 +123,22 @@ impl Bookkeeper {
         self.take(entry);
     }
 
+    /// The energies of a state that is not accepted yet, with the work of the step that leads to it.
+    pub fn ledger_at(&self, entry: Entry) -> Ledger {
+        let mut ahead = self.clone();
+        ahead.add_step(entry);
+        ahead.ledger
+    }
+
+    /// The work from outside in the step to a state that is not accepted yet, by the forces there.
+    pub fn work_by_end_forces(&self, entry: Entry) -> f64 {
+        let mut ahead = self.clone();
+        ahead.force.fill(Vec3::ZERO);
+        ahead.drives.iter_mut().for_each(|(_, force)| *force = 0.0);
+        ahead.add_step(entry);
+        2.0 * (ahead.ledger.external - self.ledger.external)
+    }
+
     /// Books the energy that an artificial resistance took on the way to a state of rest: all that
     /// is missing from the `total` before.
     pub fn damp_to(&mut self, total: f64) {

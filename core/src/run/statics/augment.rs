@@ -5,21 +5,45 @@
 //! multipliers, the stiffness grows tenfold if gaps have not become ten times smaller, and the
 //! level is balanced again, until every penetration is below what is allowed. Where this fails the
 //! stiffness is divided by ten and kept, and the same level is tried again.
+//!
+//! The stiffness of stick grows with the forces, so that friction is at its limit after a small way.
+//! Where the level fails, it begins with a softer stick, which then grows to what it was in steps
+//! through balanced states: all points find the way in which they slide. Where all that holds a part
+//! slides, the tangent is given a stiffness against sliding.
 
-use crate::effect::ContactChange;
+use crate::effect::{ContactChange, Contacts};
 use crate::integrate::Equilibrium;
 use crate::run::stage_run::StageRun;
 use crate::scalar::CompressedField;
 use crate::solve::NewtonFailure;
+use crate::system::State;
+
+/// A stiffness of stick that has become too small is raised to this multiple of what is needed.
+const STICK_RESERVE: f64 = 2.0;
+
+/// A part of a stiffness that is all of it.
+const ALL_BUT_ROUND_OFF: f64 = 1.0 - 1e-12;
+
+/// The power of the growth of stiffness that is tried after a failure.
+const GROWTH_POWER_AFTER_FAILURE: f64 = 0.25;
+
+/// The power of the growth of stiffness that is tried after a success.
+const GROWTH_POWER_AFTER_SUCCESS: f64 = 1.4;
+
+/// The least growth of stiffness that is tried.
+const SMALLEST_GROWTH: f64 = 1.05;
 
 /// Augmentations of a level, at most.
-const MOST_AUGMENTATIONS: usize = 12;
+const MOST_AUGMENTATIONS: usize = 20;
 
 /// Factor of the stiffness, and of gaps below which it stays.
 const GROWTH: f64 = 10.0;
 
 /// The smallest factor of the first stiffness of a level.
 const SOFTEST: f64 = 1e-4;
+
+/// Factors below this one become no smaller, but for round-off.
+const NEARLY_SOFTEST: f64 = 3.0 * SOFTEST;
 
 /// The largest factor of the first stiffness of a level.
 const STIFFEST_START: f64 = 1e3;
@@ -36,58 +60,120 @@ const MOST_STIFFENINGS: usize = 2;
 /// Attempts at a level with more pairs of beams, at most.
 const MOST_LISTS: usize = 4;
 
+/// The way in which contacts become firmer from one balanced state to the next.
+#[derive(Clone, Copy, Debug)]
+struct Stiffening {
+    /// Normal forces become multipliers.
+    penetrates: bool,
+    /// The stiffness of penetrations grows.
+    raises: bool,
+    /// The stiffness of stick grows.
+    sticks_softly: bool,
+}
+
+/// What the attempts at a level have changed so far.
+struct LevelAttempts {
+    /// The stiffness of penetrations with which the level before ended
+    first_factor: f64,
+    /// The part of the stiffness of stick with which an attempt begins
+    softened_stick: f64,
+    /// Attempts with a stiffer contact of beams
+    stiffenings: usize,
+    /// Attempts with more pairs of beams
+    lists: usize,
+    /// True if points that slid go on sliding in the first tangent
+    goes_on: bool,
+    /// True if the tangent resists sliding and opening
+    resists: bool,
+    /// True if that has been tried
+    has_resisted: bool,
+}
+
 impl StageRun<'_> {
     /// One attempt at a load factor, where contacts may act: first as stiff as the level before,
     /// then softer.
     pub(super) fn attempt_with_contacts(&mut self, load: f64) -> Result<(), NewtonFailure> {
-        let first_factor = self.good.contacts.first_factor;
-        let mut stiffenings = 0;
-        let mut lists = 0;
+        let mut attempts = LevelAttempts {
+            first_factor: self.good.contacts.first_factor,
+            softened_stick: 1.0,
+            stiffenings: 0,
+            lists: 0,
+            goes_on: true,
+            resists: false,
+            has_resisted: false,
+        };
         loop {
+            let contacts = &mut self.state.contacts;
+            contacts.stick_part = attempts.softened_stick;
+            (contacts.goes_on, contacts.resists) = (attempts.goes_on, attempts.resists);
             let attempt = self.attempt_once(load).and_then(|()| self.augment());
-            let failure = match attempt.and_then(|()| self.refuse_missed()) {
+            let attempt = attempt.and_then(|()| self.refuse_missed());
+            (self.state.contacts.goes_on, self.state.contacts.resists) = (true, false);
+            let failure = match attempt {
+                // A part that has left all that held it has come to no balance of its own.
+                Ok(()) if attempts.resists && !self.state_touches() => NewtonFailure::Singular(None),
                 Ok(()) => {
-                    self.state.contacts.goes_on = true;
+                    if attempts.softened_stick < 1.0 {
+                        self.state.contacts.first_factor = self.good.contacts.first_factor;
+                    }
                     return Ok(());
                 }
                 Err(failure) => failure,
             };
-            let may_soften = may_depend_on_stiffness(&failure);
-            if lists < MOST_LISTS && self.looks_at_more() {
-                lists += 1;
-                continue;
-            }
-            if may_soften && self.newton.was_shortened {
-                if stiffenings == MOST_STIFFENINGS {
-                    self.give_up(first_factor);
-                    return Err(failure);
-                }
-                stiffenings += 1;
-                self.stiffen();
-                continue;
-            }
-            if may_soften && self.good.contacts.goes_on && self.good.contacts.touches() {
-                // Where all points slide nothing may hold a part.
-                self.good.contacts.goes_on = false;
-                self.state.copy_all_but_rates(self.good);
-                continue;
-            }
-            let touched = self.good.contacts.touches() || self.state_touches();
-            if !(may_soften && touched && self.good.contacts.first_factor > SOFTEST * GROWTH.sqrt()) {
-                self.give_up(first_factor);
+            if !self.tries_again(&failure, &mut attempts) {
+                // The next level, which is a smaller one, begins as the present one did.
+                self.set_first_factor(attempts.first_factor);
                 return Err(failure);
             }
-            self.set_first_factor(self.good.contacts.first_factor / GROWTH);
-            self.counters.contacts.softenings += 1;
-            self.state.copy_all_but_rates(self.good);
         }
     }
 
-    /// Lets the next level, which is a smaller one, begin as the present one did: with this stiffness
-    /// and points that go on sliding.
-    fn give_up(&mut self, first_factor: f64) {
-        self.set_first_factor(first_factor);
-        self.good.contacts.goes_on = true;
+    /// After a failed attempt: goes back to the last good state, and changes what may help; `false`
+    /// if nothing is left to try.
+    fn tries_again(&mut self, failure: &NewtonFailure, attempts: &mut LevelAttempts) -> bool {
+        if attempts.lists < MOST_LISTS && self.looks_at_more() {
+            attempts.lists += 1;
+            return true;
+        }
+        if !may_depend_on_stiffness(failure) {
+            return false;
+        }
+        if self.newton.was_shortened {
+            attempts.stiffenings += 1;
+            if attempts.stiffenings <= MOST_STIFFENINGS {
+                self.stiffen();
+            }
+            return attempts.stiffenings <= MOST_STIFFENINGS;
+        }
+        let touched = self.good.contacts.touches();
+        if !touched && !self.state_touches() {
+            return false;
+        }
+        let is_stiff = self.good.contacts.first_factor > NEARLY_SOFTEST;
+        let sticks_firmly = self.rubs() && attempts.softened_stick > NEARLY_SOFTEST;
+        attempts.resists = false;
+        if attempts.goes_on && touched {
+            // Where all points slide nothing may hold a part.
+            attempts.goes_on = false;
+        } else if matches!(failure, NewtonFailure::Singular(_)) && !attempts.has_resisted {
+            attempts.has_resisted = true;
+            attempts.resists = true;
+        } else if is_stiff || sticks_firmly {
+            if sticks_firmly {
+                attempts.softened_stick /= GROWTH;
+            }
+            self.set_first_factor((self.good.contacts.first_factor / GROWTH).max(SOFTEST));
+            self.counters.contacts.softenings += 1;
+        } else {
+            return false;
+        }
+        self.state.copy_all_but_rates(self.good);
+        true
+    }
+
+    /// True if some contact has friction.
+    fn rubs(&self) -> bool {
+        self.model.contacts().is_some_and(|contacts| contacts.rubs())
     }
 
     /// Goes back to the last good state with a stiffer contact: a soft one cannot keep beams apart,
@@ -111,7 +197,7 @@ impl StageRun<'_> {
         }
     }
 
-    /// From a balanced state to one whose penetrations are small.
+    /// From a balanced state to one whose penetrations are small, and whose points stick firmly.
     fn augment(&mut self) -> Result<(), NewtonFailure> {
         let Some(contacts) = self.model.contacts() else { return Ok(()) };
         self.contact_change = ContactChange::None;
@@ -124,25 +210,63 @@ impl StageRun<'_> {
         let contraction = self.newton.contraction;
         let mut augmentations = 0;
         let mut before = 0.0;
-        while survey.violation > 1.0 {
-            if augmentations == MOST_AUGMENTATIONS {
+        let mut growth = GROWTH;
+        loop {
+            let penetrates = survey.violation > 1.0;
+            if !penetrates {
+                raise_stick(contacts, self.state);
+            }
+            let sticks_softly = self.state.contacts.stick_part < ALL_BUT_ROUND_OFF;
+            if !penetrates && !sticks_softly {
+                break;
+            }
+            if penetrates && augmentations == MOST_AUGMENTATIONS {
                 let depth = -survey.gap;
                 return Err(NewtonFailure::Penetrates { slot: survey.slot as usize, depth });
             }
-            // Whether points have come or gone is judged by the memory of the last good state.
-            contacts.augment(self.state);
-            let factor = &mut self.state.contacts.factor;
-            if survey.violation * GROWTH > before {
-                *factor = (*factor * GROWTH).min(STIFFEST);
+            let next =
+                Stiffening { penetrates, raises: penetrates && survey.violation * GROWTH > before, sticks_softly };
+            self.solve_firmer(next, &mut growth)?;
+            if penetrates {
+                before = survey.violation;
+                augmentations += 1;
             }
-            before = survey.violation;
-            augmentations += 1;
-            self.newton.begin_anew();
-            let Self { assembly, newton, state, model, counters, .. } = &mut *self;
-            newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work)?;
             survey = contacts.survey(self.state);
         }
         self.end_augmentations(first, contraction, augmentations)
+    }
+
+    /// Balances the state with firmer contacts. Their stiffness grows by the factor `growth`, or by
+    /// less where this fails.
+    fn solve_firmer(&mut self, next: Stiffening, growth: &mut f64) -> Result<(), NewtonFailure> {
+        let before = self.state.clone();
+        let grows = next.raises || next.sticks_softly;
+        loop {
+            if next.penetrates {
+                // Whether points have come or gone is judged by the memory of the last good state.
+                self.model.contacts().into_iter().for_each(|contacts| contacts.augment(self.state));
+            }
+            let contacts = &mut self.state.contacts;
+            if next.raises {
+                contacts.factor = (contacts.factor * *growth).min(STIFFEST);
+            }
+            if next.sticks_softly {
+                contacts.stick_part = (contacts.stick_part * *growth).min(1.0);
+            }
+            let Self { assembly, newton, state, model, counters, .. } = &mut *self;
+            newton.begin_anew();
+            match newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work) {
+                Ok(()) => {
+                    *growth = growth.powf(GROWTH_POWER_AFTER_SUCCESS).min(GROWTH);
+                    return Ok(());
+                }
+                Err(failure) if grows && may_depend_on_stiffness(&failure) && *growth > SMALLEST_GROWTH => {
+                    *growth = growth.powf(GROWTH_POWER_AFTER_FAILURE);
+                    self.state.copy_from(&before);
+                }
+                Err(failure) => return Err(failure),
+            }
+        }
     }
 
     fn end_augmentations(
@@ -164,6 +288,22 @@ impl StageRun<'_> {
         }
         Ok(())
     }
+}
+
+/// Raises the stiffness of stick of contacts whose points would reach the limit of friction too late.
+/// The stiffness that acts does not grow yet.
+fn raise_stick(contacts: &dyn Contacts, state: &mut State) {
+    let needed = contacts.needed_stick_factors(state);
+    let memory = &mut state.contacts;
+    let mut largest_growth = 1.0f64;
+    memory.full_stick_factors.resize(needed.len(), 1.0);
+    for (full, needed) in memory.full_stick_factors.iter_mut().zip(needed) {
+        if needed > *full {
+            let before = std::mem::replace(full, STICK_RESERVE * needed);
+            largest_growth = largest_growth.max(*full / before);
+        }
+    }
+    memory.stick_part /= largest_growth;
 }
 
 /// True for failures that another first stiffness of contacts may avoid.

@@ -4,6 +4,7 @@
 use super::arc_length::{Arrival, detour};
 use super::begin;
 use super::checkpoint::LevelsCheckpoint;
+use super::friction_account::FrictionAccount;
 use super::levels::{Levels, ReachedBy};
 use super::rest;
 use super::stability::{Stability, conclude, tell_of_points};
@@ -28,6 +29,8 @@ enum StepOutcome {
     Jumped(Option<Signature>),
     /// Balance, by an iteration that has not gone straight to it
     Strayed(Option<Signature>),
+    /// Balance, with more friction than energy: perhaps on another branch
+    Overdrawn(Option<Signature>),
     /// No balance
     Failed(NewtonFailure),
 }
@@ -66,7 +69,6 @@ impl<'r> Analysis<'r> for LoadLevels<'_, 'r> {
     fn judge(&mut self) {
         self.stage.warn_of_standstill();
         self.stage.warn_of_hidden_penetration();
-        self.stage.warn_of_soft_stick();
     }
 }
 
@@ -79,7 +81,9 @@ impl LoadLevels<'_, '_> {
         let stability = Stability::new(self.stage);
         let at_start = stability.signature;
         self.stage.good.copy_from(self.stage.state);
-        LevelControl { stage: self.stage, space, levels, stability, at_start, loose }.go(0, self.steps)
+        let friction_account = FrictionAccount::open(self.stage);
+        LevelControl { stage: self.stage, space, levels, stability, friction_account, at_start, loose }
+            .go(0, self.steps)
     }
 
     /// Goes on from where a checkpoint has left the stage.
@@ -91,8 +95,10 @@ impl LoadLevels<'_, '_> {
         if is_given {
             self.stage.make_again(|stage| Stability::follow_again(stage, unflattened));
         }
+        let friction_account = FrictionAccount::open(self.stage);
         let space = SpatialLook::default();
-        LevelControl { stage: self.stage, space, levels, stability, at_start, loose: None }.go(reached, self.steps)
+        LevelControl { stage: self.stage, space, levels, stability, friction_account, at_start, loose: None }
+            .go(reached, self.steps)
     }
 }
 
@@ -102,6 +108,7 @@ struct LevelControl<'s, 'r> {
     space: SpatialLook,
     levels: Levels,
     stability: Stability,
+    friction_account: FrictionAccount,
     /// The signs of pivots before the first level
     at_start: Option<Signature>,
     /// The mechanism that nothing holds before the first level
@@ -171,6 +178,10 @@ impl LevelControl<'_, '_> {
                     self.stage.counters.cutbacks += 1;
                     self.stage.state.copy_all_but_rates(self.stage.good);
                 }
+                StepOutcome::Overdrawn(signature) => {
+                    self.warn_of_friction();
+                    self.take_step(signature)?;
+                }
                 // Nothing tells better.
                 StepOutcome::Strayed(signature) => self.take_step(signature)?,
                 StepOutcome::Jumped(signature) if self.levels.approach != Approach::Path => {
@@ -215,6 +226,20 @@ impl LevelControl<'_, '_> {
         Ok(Reached::Level)
     }
 
+    /// The smallest step that is tried takes more by friction than there is.
+    fn warn_of_friction(&mut self) {
+        if std::mem::replace(&mut self.friction_account.has_warned, true) {
+            return;
+        }
+        let at = self.stage.moment();
+        let message = format!(
+            "at {at} friction takes more energy than loads, motions and strain give, however small the levels: the \
+             structure has jumped, and may be on another branch (let it move in a dynamic stage, or begin closer to \
+             contact)"
+        );
+        self.stage.warn(WarningKind::FrictionJump, message);
+    }
+
     fn try_step(&mut self, next: f64) -> StepOutcome {
         if let Err(failure) = self.stage.attempt(next) {
             return StepOutcome::Failed(failure);
@@ -222,6 +247,9 @@ impl LevelControl<'_, '_> {
         let signature = self.stability.look(self.stage);
         if let Err(failure) = NewtonFailure::unless_interrupted() {
             return StepOutcome::Failed(failure);
+        }
+        if self.friction_account.is_overdrawn(self.stage) {
+            return StepOutcome::Overdrawn(signature);
         }
         let StageRun { model, good, state, newton, soft, contact_change, .. } = &*self.stage;
         let changes = self.stability.changes_to(signature);
@@ -248,6 +276,7 @@ impl LevelControl<'_, '_> {
     fn take_step(&mut self, signature: Option<Signature>) -> Result<(), Failure> {
         let lists = self.stage.counters.contacts.lists;
         self.stage.accept()?;
+        self.friction_account.add_step(self.stage);
         let is_assembled_anew = lists != self.stage.counters.contacts.lists;
         let before = std::mem::replace(&mut self.stability.signature, signature);
         if self.stage.contact_change == ContactChange::None {

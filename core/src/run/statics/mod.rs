@@ -3,6 +3,7 @@
 mod arc_length;
 mod augment;
 pub(super) mod checkpoint;
+mod friction_account;
 mod level_control;
 mod levels;
 mod load_control;

@@ -49,13 +49,17 @@ impl<'a> PairsNow<'a> {
         } else {
             coefficient_on(0)
         };
-        let stiffness = self.stick(pair, laws);
-        (coefficient > 0.0).then_some(FrictionLaw { coefficient, stiffness })
+        laws.friction(
+            self.pairs.contact_of(pair.meeting as usize),
+            coefficient,
+            &self.stiffness(pair),
+            &self.at.contacts,
+        )
     }
 
     /// K_t of a pair.
     fn stick(&self, pair: &ListedPair, laws: &ContactLaws) -> f64 {
-        laws.stick * self.stiffness(pair).first(self.at.contacts.regime)
+        laws.stick_stiffness(self.pairs.contact_of(pair.meeting as usize), &self.stiffness(pair), &self.at.contacts)
     }
 
     /// The node of the second element that carries a pair. It stays where the point moves along the
@@ -78,7 +82,7 @@ impl<'a> PairsNow<'a> {
     /// A traction at the last converged state (global axes then), in the axes of its carrier.
     pub(super) fn on_carrier(&self, pair: &ListedPair, carrier: usize, traction: CarriedTraction) -> CarriedTraction {
         let axes = self.pose(pair, [1, carrier]).rotation.transpose();
-        CarriedTraction { goes_on: self.at.contacts.goes_on, ..traction.turned(&axes) }
+        traction.turned(&axes)
     }
 
     /// A node of a pair, by its side and its number, as the carrier saw it at the last converged
@@ -114,6 +118,23 @@ impl PairRole<'_> {
         work
     }
 
+    /// Raises the factors on the stiffness of stick that contacts need to those of their pairs.
+    pub(in crate::effect::contact) fn add_needed_stick_factors(self, at: &State, needed: &mut [f64]) {
+        let now = self.now(at);
+        now.each_point(Weights::NONE, &mut |point, _| {
+            let Some(law) = &point.law.friction else { return };
+            let meeting = point.pair.meeting as usize;
+            let contact = self.pairs.contact_of(meeting);
+            let [a, b] = self.pairs.both(meeting);
+            let [j, k] = point.pair.elements.map(|element| element as usize);
+            let length = a.element_length(j).min(b.element_length(k));
+            let limit = law.coefficient * point.state.normal_force.force;
+            let stiffness = now.stiffness(&point.pair);
+            let of_point = self.laws[contact].needed_stick_factor(limit, &stiffness, length, a.radius.min(b.radius));
+            needed[contact] = needed[contact].max(of_point);
+        });
+    }
+
     /// The energy of elastic stick of the points in memory.
     pub(in crate::effect::contact) fn stick_energy(self, at: &State) -> f64 {
         let mut energy = 0.0;
@@ -140,7 +161,7 @@ impl PairRole<'_> {
         for point in at.contacts.pairs.points.iter() {
             let laws = self.law_of(point.meeting);
             if laws.rubs() {
-                show(point, now.stick(&now.pair_of(point), laws) * point.point.carried.factor());
+                show(point, now.stick(&now.pair_of(point), laws));
             }
         }
     }

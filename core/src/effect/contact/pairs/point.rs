@@ -315,11 +315,10 @@ impl<'a> PairsNow<'a> {
         let contacts = &self.at.contacts;
         let stiffness = self.stiffness(pair);
         let normal = match contacts.regime {
-            ContactRegime::Augmented => NormalLaw::Augmented {
-                multiplier: partner.map_or(0.0, |known| known.point.multiplier),
-                stiffness: stiffness.augmented * contacts.factor,
-                touching: TOUCHING * laws.penetration,
-            },
+            ContactRegime::Augmented => {
+                let multiplier = partner.map_or(0.0, |known| known.point.multiplier);
+                laws.augmented(multiplier, &stiffness, contacts)
+            }
             ContactRegime::Penalty => {
                 NormalLaw::Penalty { stiffness: stiffness.penalty, damping: laws.damping, toe: 0.0 }
             }
@@ -407,7 +406,8 @@ impl<'a> PairsNow<'a> {
         let before = point.partner.filter(|_| is_penalty).map(|before| before.point);
         let carried = if accepts {
             let laws = &self.laws[self.pairs.contact_of(pair.meeting as usize)];
-            laws.carried(law.friction.as_ref(), &law.carried, state).turned(&point.carrier)
+            laws.carried(law.friction.is_some(), self.stiffness(pair).first(contacts.regime), state)
+                .turned(&point.carrier)
         } else {
             point.carried
         };

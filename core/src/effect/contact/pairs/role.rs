@@ -134,7 +134,7 @@ impl<'a> PairRole<'a> {
             let is_relevant = gap < 0.0 || force > RELEVANT_FORCE * largest;
             let violation = gap.abs() / self.law_of(point.pair.meeting).penetration;
             if is_relevant && violation > out.violation {
-                *out = ContactSurvey { violation, gap, slot: self.slot_of(&point.pair), points: out.points };
+                *out = ContactSurvey { violation, gap, slot: self.slot_of(&point.pair), ..*out };
             }
         });
     }
