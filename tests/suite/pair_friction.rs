@@ -153,14 +153,16 @@ fn a_scene_that_is_turned_has_the_same_friction() {
 #[test]
 fn levels_that_are_cut_give_the_answer_of_small_levels() {
     let mut random = Random::new(93);
-    let dragged = Dragged { friction: 0.3, steps: 64, ..Dragged::random(&mut random) };
-    let small = simulate(&dragged.deck());
-    // Few corrections are allowed: levels are halved.
-    let cut = [8, 7, 6, 5, 4, 3].map(|most| {
-        let keys = format!("max_iterations = {most}");
-        attempt(&Dragged { steps: 4, keys: keys.leak(), ..dragged.clone() }.deck())
-    });
-    let cut = cut.into_iter().find(|run| run.result.is_ok() && run.counters.cutbacks > 3).expect("levels that are cut");
+    // Few corrections are allowed: levels are halved, and some scenes come through.
+    let scenes = (0..16).map(|_| Dragged { friction: 0.3, steps: 1, ..Dragged::random(&mut random) });
+    let (dragged, cut) = scenes
+        .map(|dragged| {
+            let few = Dragged { keys: "max_iterations = 2", ..dragged.clone() };
+            (dragged, attempt(&few.deck()))
+        })
+        .find(|(_, run)| run.result.is_ok() && run.counters.cutbacks > 3)
+        .expect("levels that are cut");
+    let small = simulate(&Dragged { steps: 64, ..dragged }.deck());
     let [small, cut] = [ends(&small), ends(&cut)];
     println!("{small:?} {cut:?}");
     for (a, b) in small.iter().zip(&cut) {

@@ -105,6 +105,8 @@ pub struct ContactSurvey {
     pub(crate) slot: Slot,
     /// Number of points with a force
     pub(crate) points: usize,
+    /// The work of all normal forces on the way of the largest penetrations that are allowed
+    pub(crate) work_in_penetration: f64,
 }
 
 /// A penetration of a surface.

@@ -123,14 +123,8 @@ impl<'a> ChainNow<'a> {
     fn law(&self, candidate: &Candidate, predecessors: &Predecessors, partner: Option<&PointMemory>) -> ContactLaw {
         let contacts = &self.at.contacts;
         let stiffness = self.chain.stiffness[candidate.element];
-        let first = stiffness.first(contacts.regime);
-        let normal = match contacts.regime {
-            ContactRegime::Augmented => {
-                let multiplier = partner.map_or(0.0, |point| point.multiplier);
-                self.laws.augmented(multiplier, &stiffness, contacts)
-            }
-            ContactRegime::Penalty => NormalLaw::Penalty { stiffness: first, damping: self.laws.damping, toe: 0.0 },
-        };
+        let multiplier = partner.map_or(0.0, |point| point.multiplier);
+        let normal = self.laws.normal_law(multiplier, &stiffness, contacts);
         let coefficient = self.laws.friction_at(self.chain.fraction(candidate));
         let friction = self.laws.friction(self.chain.contact, coefficient, &stiffness, contacts);
         let points = self.memory.map_or(&[][..], |memory| &memory.points);

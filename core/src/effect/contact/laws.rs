@@ -71,19 +71,27 @@ impl ContactLaws {
         })
     }
 
-    /// The law of normal forces of a static stage at a point with this multiplier and stiffness. Where
-    /// the tangent resists, a point that had a force has the tangent of a contact even if it opens.
-    pub(super) fn augmented(
+    /// The law of normal forces in a state, at a point with this multiplier and stiffness. Where the
+    /// tangent resists, a point that had a force has the tangent of a contact even if it opens.
+    pub(super) fn normal_law(
         &self,
         multiplier: f64,
         stiffness: &ContactStiffness,
         contacts: &ContactMemory,
     ) -> NormalLaw {
-        let holds = contacts.resists && multiplier > 0.0;
-        NormalLaw::Augmented {
-            multiplier,
-            stiffness: stiffness.augmented * contacts.factor,
-            touching: if holds { f64::INFINITY } else { TOUCHING * self.penetration },
+        match contacts.regime {
+            ContactRegime::Augmented => NormalLaw::Augmented {
+                multiplier,
+                stiffness: stiffness.augmented * contacts.factor,
+                touching: if contacts.resists && multiplier > 0.0 {
+                    f64::INFINITY
+                } else {
+                    TOUCHING * self.penetration
+                },
+            },
+            ContactRegime::Penalty => {
+                NormalLaw::Penalty { stiffness: stiffness.penalty, damping: self.damping, toe: 0.0 }
+            }
         }
     }
 

@@ -369,6 +369,7 @@ impl Contacts for SurfaceContacts {
                 let force = point.state.normal_force.force;
                 let gap = point.state.gap;
                 out.points += usize::from(force > 0.0);
+                out.work_in_penetration += force * chain.laws.penetration;
                 let is_relevant = gap < 0.0 || force > RELEVANT_FORCE * largest_force;
                 let violation = gap.abs() / chain.laws.penetration;
                 if is_relevant && violation > out.violation {

@@ -236,23 +236,30 @@ mod tests {
         }
     }
 
+    fn random_law(random: &mut Random) -> FrictionLaw {
+        FrictionLaw {
+            coefficient: random.between(0.1, 0.8),
+            stiffness: random.between(0.5, 5.0),
+            resistance: 0.0,
+            goes_on: false,
+        }
+    }
+
+    fn random_traction(random: &mut Random) -> CarriedTraction {
+        let normal = random.direction();
+        let free = random.vector(1.0);
+        CarriedTraction { force: free - normal * normal.dot(free), normal, ..CarriedTraction::default() }
+    }
+
     #[test]
     fn tractions_have_their_derivatives() {
         let mut random = Random(5);
         let mut counts = [0; 2];
         let mut worst = 0.0f64;
         for _ in 0..600 {
-            let law = FrictionLaw {
-                coefficient: random.between(0.1, 0.8),
-                stiffness: random.between(0.5, 5.0),
-                resistance: 0.0,
-                goes_on: false,
-            };
-            let n0 = random.direction();
-            let free = random.vector(1.0);
-            let force = free - n0 * n0.dot(free);
-            let carried = CarriedTraction { force, normal: n0, ..CarriedTraction::default() };
-            let n = (n0 + random.vector(0.4)).normalized().unwrap();
+            let law = random_law(&mut random);
+            let carried = random_traction(&mut random);
+            let n = (carried.normal + random.vector(0.4)).normalized().unwrap();
             let a = random.vector(0.5);
             let p = random.between(0.1, 4.0);
             type D = Dual<7>;
@@ -278,16 +285,9 @@ mod tests {
         let mut random = Random(6);
         let mut least = f64::INFINITY;
         for _ in 0..10_000 {
-            let law = FrictionLaw {
-                coefficient: random.between(0.1, 0.8),
-                stiffness: random.between(0.5, 5.0),
-                resistance: 0.0,
-                goes_on: false,
-            };
-            let n0 = random.direction();
-            let free = random.vector(1.0);
-            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
-            let n = (n0 + random.vector(0.5)).normalized().unwrap();
+            let law = random_law(&mut random);
+            let carried = random_traction(&mut random);
+            let n = (carried.normal + random.vector(0.5)).normalized().unwrap();
             let traction = law.traction(&carried, n, random.between(0.1, 4.0), random.vector(0.5));
             least = least.min(law.dissipation(&carried, &traction));
         }
@@ -295,14 +295,60 @@ mod tests {
         assert!(least > 0.0);
     }
 
+    /// A contact is dragged to and fro while its normal force changes and its spring becomes stiffer: what it has
+    /// given back is never more than what it has taken.
+    #[test]
+    fn springs_give_back_no_more_than_they_took() {
+        let mut random = Random(9);
+        let n = Vec3::UNIT[2];
+        let mut least = f64::INFINITY;
+        for _ in 0..500 {
+            let mut law = random_law(&mut random);
+            let mut carried = CarriedTraction { normal: n, ..CarriedTraction::default() };
+            let mut taken = 0.0;
+            for _ in 0..60 {
+                law.stiffness *= if random.between(0.0, 1.0) < 0.1 { random.between(1.0, 10.0) } else { 1.0 };
+                let way = random.vector(0.3);
+                let found = law.traction(&carried, n, random.between(0.1, 30.0), way - n * n.dot(way));
+                // The force at the end of a step stands for all of it.
+                taken -= found.force.dot(found.sliding);
+                carried = CarriedTraction { force: found.force, ..carried };
+                least = least.min(taken - carried.force.squared() / (2.0 * law.stiffness));
+            }
+        }
+        println!("least taken beyond what is stored: {least:e}");
+        assert!(least > -1e-12, "{least}");
+    }
+
+    /// A resistance is in the tangent of what slides, and in no force.
+    #[test]
+    fn a_resistance_changes_no_force() {
+        let mut random = Random(10);
+        let mut slid = 0;
+        for _ in 0..300 {
+            let law = random_law(&mut random);
+            let carried = random_traction(&mut random);
+            let n = (carried.normal + random.vector(0.4)).normalized().unwrap();
+            let p = random.between(0.1, 2.0);
+            let sliding = random.vector(0.5);
+            let free = law.traction(&carried, n, p, sliding);
+            let held = FrictionLaw { resistance: 2.0, ..law }.traction(&carried, n, p, sliding);
+            assert_eq!((held.force, held.status), (free.force, free.status));
+            let more = held.over_sliding - free.over_sliding;
+            let slides = free.status == Status::Slides;
+            let expected = if slides { (n.outer(n) - Mat3::identity()).scale(2.0) } else { Mat3::zero() };
+            assert!((more - expected).max_abs() < 1e-13);
+            slid += usize::from(slides);
+        }
+        assert!(slid > 50, "{slid}");
+    }
+
     #[test]
     fn carried_tractions_keep_their_size() {
         let mut random = Random(8);
         for _ in 0..300 {
-            let n0 = random.direction();
-            let free = random.vector(1.0);
-            let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
-            let n = (n0 + random.vector(0.5)).normalized().unwrap();
+            let carried = random_traction(&mut random);
+            let n = (carried.normal + random.vector(0.5)).normalized().unwrap();
             let law = FrictionLaw { coefficient: 1.0, stiffness: 1.0, resistance: 0.0, goes_on: false };
             let traction = law.traction(&carried, n, 1e3, Vec3::ZERO);
             assert_eq!(traction.status, Status::Sticks);

@@ -107,7 +107,7 @@ impl StageRun<'_> {
             contacts.stick_part = attempts.softened_stick;
             (contacts.goes_on, contacts.resists) = (attempts.goes_on, attempts.resists);
             let attempt = self.attempt_once(load).and_then(|()| self.augment());
-            let attempt = attempt.and_then(|()| self.refuse_missed());
+            let attempt = attempt.and_then(|()| self.refuse_far_steps()).and_then(|()| self.refuse_missed());
             (self.state.contacts.goes_on, self.state.contacts.resists) = (true, false);
             let failure = match attempt {
                 // A part that has left all that held it has come to no balance of its own.
@@ -172,7 +172,7 @@ impl StageRun<'_> {
     }
 
     /// True if some contact has friction.
-    fn rubs(&self) -> bool {
+    pub(super) fn rubs(&self) -> bool {
         self.model.contacts().is_some_and(|contacts| contacts.rubs())
     }
 
@@ -239,12 +239,15 @@ impl StageRun<'_> {
     /// Balances the state with firmer contacts. Their stiffness grows by the factor `growth`, or by
     /// less where this fails.
     fn solve_firmer(&mut self, next: Stiffening, growth: &mut f64) -> Result<(), NewtonFailure> {
-        let before = self.state.clone();
         let grows = next.raises || next.sticks_softly;
+        // What does not grow is tried once.
+        let before = grows.then(|| self.state.clone());
         loop {
-            if next.penetrates {
+            if let Some(contacts) = self.model.contacts()
+                && next.penetrates
+            {
                 // Whether points have come or gone is judged by the memory of the last good state.
-                self.model.contacts().into_iter().for_each(|contacts| contacts.augment(self.state));
+                contacts.augment(self.state);
             }
             let contacts = &mut self.state.contacts;
             if next.raises {
@@ -260,11 +263,13 @@ impl StageRun<'_> {
                     *growth = growth.powf(GROWTH_POWER_AFTER_SUCCESS).min(GROWTH);
                     return Ok(());
                 }
-                Err(failure) if grows && may_depend_on_stiffness(&failure) && *growth > SMALLEST_GROWTH => {
-                    *growth = growth.powf(GROWTH_POWER_AFTER_FAILURE);
-                    self.state.copy_from(&before);
-                }
-                Err(failure) => return Err(failure),
+                Err(failure) => match &before {
+                    Some(before) if may_depend_on_stiffness(&failure) && *growth > SMALLEST_GROWTH => {
+                        *growth = growth.powf(GROWTH_POWER_AFTER_FAILURE);
+                        self.state.copy_from(before);
+                    }
+                    _ => return Err(failure),
+                },
             }
         }
     }

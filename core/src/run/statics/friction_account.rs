@@ -14,16 +14,15 @@ const LARGEST_MISSING_SHARE: f64 = 0.5;
 pub(super) struct FrictionAccount {
     /// `None` where nothing rubs, or forces act whose work is not booked
     bookkeeper: Option<Bookkeeper>,
-    /// True if the run has warned of a step that is accepted all the same
-    pub(super) has_warned: bool,
+    /// True if the stage has warned of a step that was accepted all the same
+    has_warned: bool,
 }
 
 impl FrictionAccount {
     /// At the present state of a stage, whose forces are known.
     pub fn open(stage: &StageRun) -> Self {
-        let rubs = stage.model.contacts().is_some_and(|contacts| contacts.rubs());
         let books_all = !stage.is_linear() && !stage.stage().rotating && stage.state.fading.is_empty();
-        let bookkeeper = (rubs && books_all).then(|| {
+        let bookkeeper = (stage.rubs() && books_all).then(|| {
             let mut bookkeeper = Bookkeeper::default();
             bookkeeper.open(Entry::new(stage.model, stage.state, &stage.assembly));
             bookkeeper
@@ -38,8 +37,8 @@ impl FrictionAccount {
         }
     }
 
-    /// True if friction takes far more energy on the way to a balanced state than loads, motions and
-    /// strain give: no path of equilibrium leads there.
+    /// True if friction and strain take far more energy on the way to a balanced state than loads and
+    /// motions give: no path of equilibrium leads there.
     pub fn is_overdrawn(&self, stage: &StageRun) -> bool {
         let (Some(bookkeeper), Some(contacts)) = (&self.bookkeeper, stage.model.contacts()) else { return false };
         let taken = -contacts.friction_work(stage.state);
@@ -49,12 +48,18 @@ impl FrictionAccount {
         // Surfaces that are driven do work by the forces in memory.
         let mut ahead = stage.state.clone();
         contacts.augment(&mut ahead);
-        let before = bookkeeper.ledger();
         let entry = Entry::new(stage.model, &ahead, &stage.assembly);
-        let after = bookkeeper.ledger_at(entry);
+        let [before, after] = [bookkeeper.ledger(), bookkeeper.ledger_at(entry)];
         let stored = after.strain - before.strain;
         // A load may pass from one support to another at the very start of a step.
         let given = (after.external - before.external).max(bookkeeper.work_by_end_forces(entry));
-        stored + taken - given > LARGEST_MISSING_SHARE * (stored.abs() + taken + given.abs())
+        // Normal forces do work that is not booked while gaps change within what is allowed.
+        let unbooked = contacts.survey(stage.state).work_in_penetration;
+        stored + taken - given > LARGEST_MISSING_SHARE * (stored.abs() + taken + given.abs()) + unbooked
+    }
+
+    /// True once, for the first warning of the stage.
+    pub fn may_warn(&mut self) -> bool {
+        !std::mem::replace(&mut self.has_warned, true)
     }
 }

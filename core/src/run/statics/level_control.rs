@@ -228,14 +228,14 @@ impl LevelControl<'_, '_> {
 
     /// The smallest step that is tried takes more by friction than there is.
     fn warn_of_friction(&mut self) {
-        if std::mem::replace(&mut self.friction_account.has_warned, true) {
+        if !self.friction_account.may_warn() {
             return;
         }
         let at = self.stage.moment();
         let message = format!(
-            "at {at} friction takes more energy than loads, motions and strain give, however small the levels: the \
-             structure has jumped, and may be on another branch (let it move in a dynamic stage, or begin closer to \
-             contact)"
+            "at {at} friction and strain take more energy than loads and motions give: the structure has jumped to \
+             another equilibrium (use more levels, do not switch `adaptive` off, or simulate the motion in a dynamic \
+             stage)"
         );
         self.stage.warn(WarningKind::FrictionJump, message);
     }

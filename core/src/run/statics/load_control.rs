@@ -41,6 +41,11 @@ impl StageRun<'_> {
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
         let moved = moves.then_some(&prescribed_increment[..]);
         newton.solve(model, assembly, state, &Equilibrium, moved, &mut counters.work)?;
+        self.refuse_far_steps()
+    }
+
+    /// Refuses a step on which something has left its place, or has turned too far.
+    pub(super) fn refuse_far_steps(&self) -> Result<(), NewtonFailure> {
         self.refuse_departures()?;
         self.refuse_leaps()?;
         self.refuse_windings()

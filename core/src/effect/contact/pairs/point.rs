@@ -7,7 +7,7 @@ use crate::effect::contact::predecessors::{LARGEST_SHIFT, Link, Predecessors, Re
 use crate::effect::contact::strand::ContactStiffness;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::{
-    CarriedTraction, ContactNode, NodeBefore, NormalLaw, PairLaw, PairSide, PointState, ShapeAt, add_pair,
+    CarriedTraction, ContactNode, NodeBefore, PairLaw, PairSide, PointState, ShapeAt, add_pair,
 };
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
@@ -314,15 +314,8 @@ impl<'a> PairsNow<'a> {
         let Part { pair, candidate, partner, .. } = part;
         let contacts = &self.at.contacts;
         let stiffness = self.stiffness(pair);
-        let normal = match contacts.regime {
-            ContactRegime::Augmented => {
-                let multiplier = partner.map_or(0.0, |known| known.point.multiplier);
-                laws.augmented(multiplier, &stiffness, contacts)
-            }
-            ContactRegime::Penalty => {
-                NormalLaw::Penalty { stiffness: stiffness.penalty, damping: laws.damping, toe: 0.0 }
-            }
-        };
+        let multiplier = partner.map_or(0.0, |known| known.point.multiplier);
+        let normal = laws.normal_law(multiplier, &stiffness, contacts);
         let [a, b] = self.pairs.both(pair.meeting as usize);
         let is_penalty = contacts.regime == ContactRegime::Penalty;
         let offset = partner.filter(|_| is_penalty).map_or(0.0, |known| known.point.offset);

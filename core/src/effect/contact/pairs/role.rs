@@ -131,6 +131,7 @@ impl<'a> PairRole<'a> {
             let force = point.state.normal_force.force;
             let gap = point.state.gap;
             out.points += usize::from(force > 0.0);
+            out.work_in_penetration += point.candidate.weight * force * self.law_of(point.pair.meeting).penetration;
             let is_relevant = gap < 0.0 || force > RELEVANT_FORCE * largest;
             let violation = gap.abs() / self.law_of(point.pair.meeting).penetration;
             if is_relevant && violation > out.violation {
