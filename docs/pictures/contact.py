@@ -62,6 +62,7 @@ def circle(centre, radius, axes):
 SCENES = {
     "mast": Scene("contact/scenes/mast_unfolds", ["first", "second", "third"], rows=9, surfaces=[[[-0.1, 0, 0], [3.2, 0, 0]]]),
     "coil": Scene("contact/scenes/coil_spring_closes", ["coil"], rows=2, places=400),
+    "knot": Scene("contact/scenes/knot", ["cord"], view=top, rows=4, places=160),
     "guidewire": Scene("contact/scenes/guidewire", ["wire"], view=top, rows=4, places=300),
     "winch": Scene(
         "contact/scenes/winch", ["cable"], view=oblique, rows=1, places=240,

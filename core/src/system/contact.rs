@@ -140,9 +140,9 @@ impl PointMemory {
 pub struct PairsMemory {
     /// The pairs that are looked at, in their order
     pub list: Arc<Vec<ListedPair>>,
-    /// The part of the force of each pair that closest points of both elements carry; nodes carry
-    /// the rest. Constant in a step.
-    pub(crate) blend: Arc<Vec<f64>>,
+    /// Unit tangents of all beams at their nodes at the last converged state (global axes); empty
+    /// where no pair is listed
+    pub(crate) directions: Arc<Vec<Vec3>>,
     /// Places of the nodes of all beams when the list was made; empty before the first list
     pub(crate) places: Arc<Vec<Vec3>>,
     /// The gap up to which pairs are in the list, a length

@@ -416,7 +416,6 @@ impl Contacts for SurfaceContacts {
             point.offset = point.force / stiffness.penalty + point.gap;
             point.steps = 0;
         });
-        self.pairs().share_anew(at);
     }
 
     fn accept(&self, before: &State, at: &mut State) {

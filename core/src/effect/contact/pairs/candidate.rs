@@ -8,7 +8,7 @@ use crate::effect::contact::chain::CAP_COSINE;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::pair_search::{bilateral, closest_to_point};
 use crate::kernel::contact::{MinimumKind, ShapeAt};
-use crate::system::{ContactRegime, PairPointKind};
+use crate::system::PairPointKind;
 use crate::tensor::Vec3;
 
 /// Closest points nearer to a node than this part of the element are at the node.
@@ -110,43 +110,36 @@ fn is_inside(s: f64) -> bool {
     s > AT_NODE && s < 1.0 - AT_NODE
 }
 
-/// Weights of the points of a pair by their kind; points without a weight are left out.
+/// The kinds of points that a pair of elements has.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PointWeights {
-    closest: f64,
-    node: f64,
+pub(super) struct Kinds {
+    /// Closest points of both
+    pub(super) closest: bool,
+    /// Nodes of both
+    pub(super) nodes: bool,
 }
 
-impl PointWeights {
+impl Kinds {
     /// Both kinds.
-    pub const ALL: Self = Self { closest: 1.0, node: 0.5 };
-
-    /// Weights where closest points carry the part `blend` of the force. Penalties share the force of
-    /// the same gap. Multipliers close the gap of each point whatever its weight, which only makes
-    /// its stiffness smaller: a point of small weight would take many augmentations.
-    pub fn new(blend: f64, regime: ContactRegime) -> Self {
-        match regime {
-            ContactRegime::Penalty => Self { closest: blend, node: 0.5 * (1.0 - blend) },
-            ContactRegime::Augmented => Self {
-                closest: if blend > 0.0 { Self::ALL.closest } else { 0.0 },
-                node: if blend < 1.0 { Self::ALL.node } else { 0.0 },
-            },
-        }
-    }
+    pub const ALL: Self = Self { closest: true, nodes: true };
 }
 
-/// Adds the candidates of two elements.
+/// The part of the force at a node of one of two elements side by side.
+const OF_NODE: f64 = 0.5;
+
+/// Adds the candidates of two elements, with the weights of beams that cross, and of beams side by
+/// side.
 pub(super) fn candidates<const NA: usize, const NB: usize>(
     a: &Side<NA>,
     b: &Side<NB>,
-    weights: PointWeights,
+    kinds: Kinds,
     out: &mut Vec<PairCandidate>,
 ) {
-    if weights.closest > 0.0 {
-        add_closest(a, b, weights.closest, out);
+    if kinds.closest {
+        add_closest(a, b, out);
     }
-    if weights.node > 0.0 {
-        let weight = weights.node;
+    if kinds.nodes {
+        let weight = OF_NODE;
         add_nodes(a, b, &mut |[s, e], moves| {
             out.push(PairCandidate { at: [s, e], free: [false, moves], kind: PairPointKind::NodeOfFirst, weight });
         });
@@ -156,14 +149,9 @@ pub(super) fn candidates<const NA: usize, const NB: usize>(
     }
 }
 
-fn add_closest<const NA: usize, const NB: usize>(
-    a: &Side<NA>,
-    b: &Side<NB>,
-    weight: f64,
-    out: &mut Vec<PairCandidate>,
-) {
+fn add_closest<const NA: usize, const NB: usize>(a: &Side<NA>, b: &Side<NB>, out: &mut Vec<PairCandidate>) {
     let mut add = |at: [f64; 2], free: [bool; 2]| {
-        out.push(PairCandidate { at, free, kind: PairPointKind::Closest, weight });
+        out.push(PairCandidate { at, free, kind: PairPointKind::Closest, weight: 1.0 });
     };
     let inner = bilateral(&a.nodes, &b.nodes);
     inner

@@ -11,7 +11,7 @@ use crate::effect::MissedPairs;
 use crate::effect::contact::chain::REACH;
 use crate::kernel::contact::grid::{Ball, overlapping};
 use crate::kernel::contact::pair_search::{Segments, safe_part};
-use crate::system::{ContactRegime, ListedPair, PairsMemory, State};
+use crate::system::{ListedPair, PairsMemory, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -33,20 +33,6 @@ const OLD: f64 = 0.25;
 /// Pairs that a step may add to a list, for each element.
 const MOST_MISSED: usize = 8;
 
-/// The largest angle of elements side by side, in radians: 10 degrees.
-const SIDE_BY_SIDE: f64 = 0.174_532_925_199_432_95;
-
-/// The smallest angle of elements that cross, in radians: 20 degrees.
-const CROSSING: f64 = 2.0 * SIDE_BY_SIDE;
-
-/// The largest offset of neighbouring nodes across the other beam, over the sum of radii, at which
-/// nodes carry all of the force. The gap between two nodes in contact is then less than theirs by
-/// 3e-4 of that sum.
-const SMALLEST_OFFSET: f64 = 0.05;
-
-/// The offset from which on closest points carry all of the force.
-const LARGEST_OFFSET: f64 = 0.15;
-
 impl BeamPairs {
     /// Makes the first list.
     pub(in crate::effect::contact) fn list(&self, at: &State) -> PairsMemory {
@@ -54,7 +40,7 @@ impl BeamPairs {
         let margin = self.margin();
         let list = self.near(&places, margin);
         PairsMemory {
-            blend: Arc::new(self.blend(&list, &places, at.contacts.regime)),
+            directions: Arc::new(self.directions_of(&list, &places)),
             list: Arc::new(list),
             places: Arc::new(places),
             margin,
@@ -63,8 +49,8 @@ impl BeamPairs {
         }
     }
 
-    /// Makes the list of an accepted state anew where nodes have moved, and in any case how pairs
-    /// share their forces.
+    /// Makes the list of an accepted state anew where nodes have moved, and in any case the
+    /// directions by which points share their forces.
     pub(super) fn renew_list(&self, before: &State, memory: &mut PairsMemory, at: &State) {
         let places = self.places(at);
         if farthest(&places, &memory.places) > OLD * memory.margin {
@@ -78,7 +64,7 @@ impl BeamPairs {
             memory.margin = margin;
             memory.places = Arc::new(places.clone());
         }
-        memory.blend = Arc::new(self.blend(&memory.list, &places, at.contacts.regime));
+        memory.directions = Arc::new(self.directions_of(&memory.list, &places));
     }
 
     /// Adds to the list of `from` the pairs that may have met on the way to another state without
@@ -103,9 +89,14 @@ impl BeamPairs {
         let mut list = (*memory.list).clone();
         list.extend(missed);
         list.sort_unstable();
-        memory.blend = Arc::new(self.blend(&list, &before, to.contacts.regime));
+        memory.directions = Arc::new(self.directions_of(&list, &before));
         memory.list = Arc::new(list);
         MissedPairs::Listed(slot)
+    }
+
+    /// Directions at all nodes; none where no pair is listed.
+    fn directions_of(&self, list: &[ListedPair], places: &[Vec3]) -> Vec<Vec3> {
+        if list.is_empty() { Vec::new() } else { self.directions(places) }
     }
 
     /// The smallest margin of a list.
@@ -235,42 +226,6 @@ impl BeamPairs {
     fn sags(&self, pair: &ListedPair, places: &[Vec3]) -> f64 {
         self.elements_of(pair).map(|of| sag(self.of_element(of, places))).iter().sum()
     }
-
-    /// The part of the force of each pair that closest points carry, by the angle between the
-    /// chords of its elements: all of it where they cross, none where they are side by side. In static
-    /// stages also by how far the angle takes neighbouring nodes across the other beam. Penalties
-    /// would jump there where a point goes from one pair of curved beams to the next.
-    pub(super) fn blend(&self, list: &[ListedPair], places: &[Vec3], regime: ContactRegime) -> Vec<f64> {
-        let of_pair = |pair: &ListedPair| {
-            let chord = |of: ElementOf| {
-                let nodes = self.of_element(of, places);
-                nodes[nodes.len() - 1] - nodes[0]
-            };
-            let [a, b] = self.elements_of(pair).map(chord);
-            let strands = self.both(pair.meeting as usize);
-            let spacing = (a.norm() / strands[0].order as f64).min(b.norm() / strands[1].order as f64);
-            let [a, b] = [a, b].map(|chord| chord.normalized().unwrap_or(Vec3::ZERO));
-            let sine = a.cross(b).norm();
-            let angle = libm::atan2(sine, a.dot(b).abs());
-            let offset = spacing * sine / (strands[0].radius + strands[1].radius);
-            let by_angle = smooth_part(angle, [SIDE_BY_SIDE, CROSSING]);
-            // The closest points of curved elements side by side may part into two.
-            let is_straight = strands.iter().all(|strand| strand.order == 1);
-            match regime {
-                ContactRegime::Augmented if is_straight => {
-                    by_angle.max(smooth_part(offset, [SMALLEST_OFFSET, LARGEST_OFFSET]))
-                }
-                ContactRegime::Augmented | ContactRegime::Penalty => by_angle,
-            }
-        };
-        list.iter().map(of_pair).collect()
-    }
-}
-
-/// 0 below the first bound, 1 above the second one, between them a smooth step.
-fn smooth_part(value: f64, [low, high]: [f64; 2]) -> f64 {
-    let part = ((value - low) / (high - low)).clamp(0.0, 1.0);
-    part * part * (3.0 - 2.0 * part)
 }
 
 /// The largest distance between places of the same node.

@@ -2,13 +2,14 @@
 //!
 //! A list in the state holds the pairs of elements that are near each other ([`list`]); nothing else
 //! is looked at. Elements that cross carry a force at their closest points; elements side by side
-//! carry it at the nodes of both ([`candidate`]).
+//! carry it at the nodes of both ([`candidate`], [`sharing`]).
 
 mod candidate;
 mod friction;
 mod list;
 mod point;
 mod role;
+mod sharing;
 
 pub(super) use role::PairRole;
 

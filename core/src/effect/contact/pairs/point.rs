@@ -1,6 +1,6 @@
 //! Contact points of listed pairs in a state, with their forces.
 
-use super::candidate::{PairCandidate, PointWeights, Side, candidates};
+use super::candidate::{Kinds, PairCandidate, Side, candidates};
 use super::{BeamPairs, ElementOf};
 use crate::effect::contact::laws::{ContactLaws, TOUCHING};
 use crate::effect::contact::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
@@ -14,9 +14,6 @@ use crate::rotation::Rotation;
 use crate::system::{ContactRegime, ListedPair, PairPointKind, PairPointMemory, PointMemory, State};
 use crate::tensor::{Mat3, Vec3};
 use std::borrow::Cow;
-
-/// Closest points nearer to each other than this part of an element, on both beams, are one contact.
-const SAME_PLACE: f64 = 0.9;
 
 /// A contact point of two beams in a state.
 pub(super) struct PairPoint<'a> {
@@ -84,9 +81,9 @@ pub(super) struct PairsNow<'a> {
     pub(super) at: &'a State,
     /// The list, which is that of the state but in an assembly of another one
     pub(super) list: &'a [ListedPair],
-    places: Vec<Vec3>,
-    /// The part of the force of each pair of the list that closest points carry
-    blend: Cow<'a, [f64]>,
+    pub(super) places: Vec<Vec3>,
+    /// Directions of the beams at all nodes at the last converged state
+    pub(super) directions: Cow<'a, [Vec3]>,
 }
 
 /// Calls a function of two numbers of nodes, for elements of given orders.
@@ -110,13 +107,12 @@ impl<'a> PairsNow<'a> {
     pub fn new(pairs: &'a BeamPairs, laws: &'a [ContactLaws], at: &'a State, list: &'a [ListedPair]) -> Self {
         let places = if list.is_empty() { Vec::new() } else { pairs.places(at) };
         let known = &at.contacts.pairs;
-        let is_known = *list == **known.list && known.blend.len() == list.len();
-        let blend = if is_known {
-            Cow::Borrowed(&known.blend[..])
+        let directions = if known.directions.len() == places.len() {
+            Cow::Borrowed(&known.directions[..])
         } else {
-            Cow::Owned(pairs.blend(list, &places, at.contacts.regime))
+            Cow::Owned(pairs.directions(&places))
         };
-        Self { pairs, laws, at, list, places, blend }
+        Self { pairs, laws, at, list, places, directions }
     }
 
     /// Visits the points of all pairs that act, with their systems.
@@ -145,13 +141,9 @@ impl<'a> PairsNow<'a> {
         let mut found = Vec::new();
         for (number, pair) in (first..).zip(group) {
             if self.pairs.chord_gap(pair, &self.places) <= reach {
-                let weights = PointWeights::new(self.blend[number], self.at.contacts.regime);
-                let candidates = self.candidates(pair, weights);
+                let candidates = self.sharing_candidates(pair, reach);
                 found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
             }
-        }
-        if self.at.contacts.regime == ContactRegime::Penalty {
-            self.keep_nearest(&mut found);
         }
         let all = self.predecessors(&found, known, laws);
         let orders = self.pairs.both(group[0].meeting as usize).map(|strand| strand.order);
@@ -211,19 +203,15 @@ impl<'a> PairsNow<'a> {
         ContactStiffness { augmented: in_series(a.augmented, b.augmented), penalty: in_series(a.penalty, b.penalty) }
     }
 
-    fn candidates(&self, pair: &ListedPair, weights: PointWeights) -> Vec<PairCandidate> {
+    pub(super) fn candidates(&self, pair: &ListedPair, kinds: Kinds) -> Vec<PairCandidate> {
         let orders = self.pairs.both(pair.meeting as usize).map(|strand| strand.order);
-        of_orders!(orders, self.candidates_of(pair, weights))
+        of_orders!(orders, self.candidates_of(pair, kinds))
     }
 
-    fn candidates_of<const NA: usize, const NB: usize>(
-        &self,
-        pair: &ListedPair,
-        weights: PointWeights,
-    ) -> Vec<PairCandidate> {
+    fn candidates_of<const NA: usize, const NB: usize>(&self, pair: &ListedPair, kinds: Kinds) -> Vec<PairCandidate> {
         let [a, b] = self.pairs.elements_of(pair);
         let mut out = Vec::new();
-        candidates(&self.side::<NA>(a), &self.side::<NB>(b), weights, &mut out);
+        candidates(&self.side::<NA>(a), &self.side::<NB>(b), kinds, &mut out);
         out
     }
 
@@ -253,41 +241,13 @@ impl<'a> PairsNow<'a> {
         }
         let orders = strands.map(|strand| strand.order);
         let distance = |candidate: &PairCandidate| of_orders!(orders, self.distance(pair, candidate.at));
-        let distances = self.candidates(pair, PointWeights::ALL).iter().map(distance).fold(f64::INFINITY, f64::min);
+        let distances = self.candidates(pair, Kinds::ALL).iter().map(distance).fold(f64::INFINITY, f64::min);
         distances - strands[0].radius - strands[1].radius
     }
 
     fn distance<const NA: usize, const NB: usize>(&self, pair: &ListedPair, [s, e]: [f64; 2]) -> f64 {
         let [a, b] = self.pairs.elements_of(pair);
         (self.side::<NA>(a).place(s) - self.side::<NB>(b).place(e)).norm()
-    }
-
-    /// Of closest points near each other on both beams, and of those of a node, as at the inside of a
-    /// kink, keeps the one with the smallest gap: two penalties would jump to one where the points
-    /// merge.
-    fn keep_nearest(&self, found: &mut Vec<Found>) {
-        let Some(first) = found.first() else { return };
-        let strands = self.pairs.both(self.list[first.number].meeting as usize);
-        let orders = strands.map(|strand| strand.order);
-        let reach = |Found { number, candidate }: &Found| {
-            let pair = &self.list[*number];
-            let along = [0, 1].map(|side| f64::from(pair.elements[side]) + candidate.at[side]);
-            (candidate.kind, along, of_orders!(orders, self.distance(pair, candidate.at)))
-        };
-        let all: Vec<(PairPointKind, [f64; 2], f64)> = found.iter().map(reach).collect();
-        let is_beaten = |own: usize| {
-            let (kind, place, gap) = all[own];
-            all.iter().enumerate().any(|(other, (other_kind, at, less))| {
-                let shifts = [0, 1].map(|side| strands[side].shift(place[side], at[side]));
-                let is_near = *other_kind == kind && is_near(kind, shifts, SAME_PLACE);
-                is_near && (*less < gap || (*less == gap && other < own))
-            })
-        };
-        let mut own = 0;
-        found.retain(|_| {
-            own += 1;
-            !is_beaten(own - 1)
-        });
     }
 
     /// True if a point continues one in memory.

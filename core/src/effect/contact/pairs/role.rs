@@ -96,15 +96,6 @@ impl<'a> PairRole<'a> {
         }
     }
 
-    /// Shares forces as the law of a stage that begins wants it.
-    pub fn share_anew(self, at: &mut State) {
-        let pairs = &at.contacts.pairs;
-        if !pairs.list.is_empty() {
-            let blend = self.pairs.blend(&pairs.list, &self.pairs.places(at), at.contacts.regime);
-            at.contacts.pairs.blend = Arc::new(blend);
-        }
-    }
-
     /// Makes the list of an accepted state.
     pub fn renew_list(self, before: &State, at: &mut State) {
         let mut memory = at.contacts.pairs.clone();

@@ -1,0 +1,256 @@
+//! How contact points of beams share their force.
+//!
+//! Where beams cross, closest points carry it; where they are side by side, the nodes of both; in
+//! between, both. The angle is that of directions at the nodes, linear along the elements, so that
+//! a point that passes from one element to the next keeps its share.
+
+use super::candidate::{Kinds, PairCandidate};
+use super::point::PairsNow;
+use super::{BeamPairs, ElementOf};
+use crate::kernel::contact::ShapeAt;
+use crate::kernel::contact::along::weighted_sum;
+use crate::system::{ContactRegime, ListedPair, PairPointKind};
+use crate::tensor::Vec3;
+use std::f64::consts::FRAC_PI_2;
+
+/// The largest angle of elements side by side, in radians: 10 degrees.
+const SIDE_BY_SIDE: f64 = 0.174_532_925_199_432_95;
+
+/// The smallest angle of elements that cross, in radians: 20 degrees.
+const CROSSING: f64 = 2.0 * SIDE_BY_SIDE;
+
+/// The largest offset of neighbouring nodes across the other beam, over the sum of radii, at which
+/// nodes carry all of the force. The gap between two nodes in contact is then less than theirs by
+/// 3e-4 of that sum.
+const SMALLEST_OFFSET: f64 = 0.05;
+
+/// The offset from which on closest points carry all of the force.
+const LARGEST_OFFSET: f64 = 0.15;
+
+/// The cosine of the angle between a kink and a point up to which the point is beside the kink,
+/// neither inside nor outside.
+const BESIDE: f64 = 0.5;
+
+impl BeamPairs {
+    /// Unit tangents of centre lines at all nodes: where elements meet, the mean of both.
+    pub(super) fn directions(&self, places: &[Vec3]) -> Vec<Vec3> {
+        let mut sums = vec![Vec3::ZERO; places.len()];
+        for (number, strand) in self.strands.iter().enumerate() {
+            let first = self.first_nodes[number];
+            for element in 0..strand.elements() {
+                let nodes = self.of_element(ElementOf { strand: number, element }, places);
+                for i in 0..nodes.len() {
+                    let [_, slope] = place_and_slope(nodes, i as f64 / strand.order as f64);
+                    sums[first + element * strand.order + i] += slope.normalized().unwrap_or(Vec3::ZERO);
+                }
+            }
+            if strand.is_closed() {
+                let last = first + strand.nodes.len() - 1;
+                let sum = sums[first] + sums[last];
+                sums[first] = sum;
+                sums[last] = sum;
+            }
+        }
+        sums.iter().map(|sum| sum.normalized().unwrap_or(Vec3::ZERO)).collect()
+    }
+}
+
+impl PairsNow<'_> {
+    /// The candidates of a pair with the parts of the force that they carry. `reach`: the largest gap
+    /// with a force.
+    pub(super) fn sharing_candidates(&self, pair: &ListedPair, reach: f64) -> Vec<PairCandidate> {
+        let mut candidates = self.candidates(pair, self.kinds_of(pair));
+        candidates.retain_mut(|candidate| {
+            candidate.weight *= self.part_by_angle(pair, candidate);
+            if self.at.contacts.regime == ContactRegime::Penalty && self.gap_of(pair, candidate) <= reach {
+                candidate.weight *= self.part_beside_kinks(pair, candidate);
+            }
+            candidate.weight > 0.0
+        });
+        candidates
+    }
+
+    fn gap_of(&self, pair: &ListedPair, candidate: &PairCandidate) -> f64 {
+        let elements = self.pairs.elements_of(pair);
+        let [a, b] = [0, 1].map(|side| self.place_and_slope(elements[side], candidate.at[side])[0]);
+        let [first, second] = self.pairs.both(pair.meeting as usize);
+        (a - b).norm() - first.radius - second.radius
+    }
+
+    /// The kinds of points that a pair may have, by the angles between its elements.
+    fn kinds_of(&self, pair: &ListedPair) -> Kinds {
+        let directions = self.pairs.elements_of(pair).map(|of| self.pairs.of_element(of, &self.directions));
+        let middles = directions.map(|nodes| nodes.iter().fold(Vec3::ZERO, |sum, node| sum + *node));
+        let spread = |side: usize| directions[side].iter().map(|node| angle(*node, middles[side])).fold(0.0, f64::max);
+        let spreads = spread(0) + spread(1);
+        let middle = angle_of_lines(middles[0], middles[1]);
+        Kinds {
+            closest: self.part_of_closest(pair, middle + spreads) > 0.0,
+            nodes: self.part_of_closest(pair, middle - spreads) < 1.0,
+        }
+    }
+
+    /// The part of the force of a candidate of its kind. Penalties share the force of the same gap.
+    /// Multipliers close the gap of each point whatever its weight, which only makes its stiffness
+    /// smaller: a point of small weight would take many augmentations.
+    fn part_by_angle(&self, pair: &ListedPair, candidate: &PairCandidate) -> f64 {
+        let [a, b] = self.pairs.elements_of(pair);
+        let [a, b] = [self.direction(a, candidate.at[0]), self.direction(b, candidate.at[1])];
+        let closest = self.part_of_closest(pair, angle_of_lines(a, b));
+        let part = match candidate.kind {
+            PairPointKind::Closest => closest,
+            PairPointKind::NodeOfFirst | PairPointKind::NodeOfSecond => 1.0 - closest,
+        };
+        match self.at.contacts.regime {
+            ContactRegime::Penalty => part,
+            ContactRegime::Augmented => f64::from(part > 0.0),
+        }
+    }
+
+    /// The part of the force that closest points carry at an angle between both beams: all of it
+    /// where they cross, none where they are side by side. In static stages also by how far the
+    /// angle takes neighbouring nodes across the other beam.
+    fn part_of_closest(&self, pair: &ListedPair, angle: f64) -> f64 {
+        let by_angle = smooth_part(angle, [SIDE_BY_SIDE, CROSSING]);
+        let strands = self.pairs.both(pair.meeting as usize);
+        // The closest points of curved elements side by side may part into two.
+        let is_straight = strands.iter().all(|strand| strand.order == 1);
+        match self.at.contacts.regime {
+            ContactRegime::Augmented if is_straight => {
+                let of_side = |side: usize| strands[side].element_length(pair.elements[side] as usize);
+                let across = of_side(0).min(of_side(1)) * libm::sin(angle.clamp(0.0, FRAC_PI_2));
+                let offset = across / (strands[0].radius + strands[1].radius);
+                by_angle.max(smooth_part(offset, [SMALLEST_OFFSET, LARGEST_OFFSET]))
+            }
+            ContactRegime::Augmented | ContactRegime::Penalty => by_angle,
+        }
+    }
+
+    /// The direction of the centre line at a place of an element, linear between its nodes.
+    fn direction(&self, of: ElementOf, s: f64) -> Vec3 {
+        let nodes = self.pairs.of_element(of, &self.directions);
+        let at = s * (nodes.len() - 1) as f64;
+        let before = (at as usize).min(nodes.len() - 2);
+        let part = at - before as f64;
+        nodes[before] * (1.0 - part) + nodes[before + 1] * part
+    }
+
+    /// The inside of a kink has closest points on both sides of it, of which one begins and ends at
+    /// the kink while the other one has a force. Penalties share it by their ways to the kink.
+    fn part_beside_kinks(&self, pair: &ListedPair, candidate: &PairCandidate) -> f64 {
+        let elements = self.pairs.elements_of(pair);
+        let of_side = |side: usize| {
+            let other = 1 - side;
+            let seen_from = |kink: Vec3| match candidate.kind {
+                PairPointKind::Closest => self.nearest(kink, elements[other], candidate.at[other]),
+                PairPointKind::NodeOfFirst | PairPointKind::NodeOfSecond => {
+                    self.place_and_slope(elements[other], candidate.at[other])[0]
+                }
+            };
+            let part_at = |end: f64| self.part_inside(elements[side], end, &seen_from);
+            part_at(0.0) * part_at(1.0)
+        };
+        match candidate.kind {
+            PairPointKind::Closest => of_side(0) * of_side(1),
+            PairPointKind::NodeOfFirst => of_side(1),
+            PairPointKind::NodeOfSecond => of_side(0),
+        }
+    }
+
+    /// The part of a force that an element carries beside the kink at one of its ends, 0 or 1. Seen
+    /// from the point of the other beam that belongs to the kink, the feet on both sides of it have the
+    /// ways d_1 and d_2 to the kink: d_1/(d_1 + d_2) if both exist.
+    fn part_inside(&self, of: ElementOf, end: f64, seen_from: &dyn Fn(Vec3) -> Vec3) -> f64 {
+        let Some(next) = self.neighbour(of, end) else { return 1.0 };
+        let kink = self.kink(of, end, next);
+        let apart = seen_from(kink.place) - kink.place;
+        let [own, others] = [-kink.own.dot(apart), kink.beyond.dot(apart)];
+        if own + others > 0.0 { (own / (own + others)).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
+    /// The place of a beam nearest to a point, looked for from a place on one of its elements. It goes on
+    /// to the next element where a kink has its outside towards the point. At the inside of a kink the
+    /// element goes on straight, since the place beyond belongs to another contact. In between, both.
+    fn nearest(&self, point: Vec3, of: ElementOf, from: f64) -> Vec3 {
+        let [place, slope] = self.place_and_slope(of, from);
+        let to = from + slope.dot(point - place) / slope.squared();
+        let end = to.clamp(0.0, 1.0);
+        let next = if to == end { None } else { self.neighbour(of, end) };
+        let Some(next) = next else { return self.place_and_slope(of, end)[0] };
+        let kink = self.kink(of, end, next);
+        let [towards, turn] = [point - kink.place, kink.turn()].map(|vector| vector.normalized().unwrap_or(Vec3::ZERO));
+        let inside = smooth_part(towards.dot(turn), [-BESIDE, BESIDE]);
+        let straight = self.place_and_slope(of, end)[1] * (to - end);
+        let [_, beyond] = self.place_and_slope(next, 1.0 - end);
+        let way = kink.beyond.dot(towards) * (point - kink.place).norm();
+        let walked = kink.beyond * way.clamp(0.0, beyond.norm());
+        kink.place + straight * inside + walked * (1.0 - inside)
+    }
+
+    /// The kink between an element, at its end 0 or 1, and the one beyond.
+    fn kink(&self, of: ElementOf, end: f64, next: ElementOf) -> Kink {
+        let [place, slope] = self.place_and_slope(of, end);
+        let [_, beyond] = self.place_and_slope(next, 1.0 - end);
+        let out = if end == 1.0 { 1.0 } else { -1.0 };
+        let [own, beyond] = [slope, beyond].map(|slope| slope.normalized().unwrap_or(Vec3::ZERO) * out);
+        Kink { place, own, beyond }
+    }
+
+    /// The element beyond an end of an element, 0 or 1.
+    fn neighbour(&self, of: ElementOf, end: f64) -> Option<ElementOf> {
+        let strand = &self.pairs.strands[of.strand];
+        let count = strand.elements();
+        let is_last = of.element == if end == 1.0 { count - 1 } else { 0 };
+        let step = if end == 1.0 { 1 } else { count - 1 };
+        (!is_last || strand.is_closed()).then(|| ElementOf { element: (of.element + step) % count, ..of })
+    }
+
+    fn place_and_slope(&self, of: ElementOf, s: f64) -> [Vec3; 2] {
+        place_and_slope(self.pairs.of_element(of, &self.places), s)
+    }
+}
+
+/// Where two elements of a beam meet.
+struct Kink {
+    place: Vec3,
+    /// Unit tangent of the first element, away from it
+    own: Vec3,
+    /// Unit tangent of the next element, into it
+    beyond: Vec3,
+}
+
+impl Kink {
+    /// Towards the inside of the kink.
+    fn turn(&self) -> Vec3 {
+        self.beyond - self.own
+    }
+}
+
+/// The place on an element with these nodes at a point, and its derivative.
+fn place_and_slope(nodes: &[Vec3], s: f64) -> [Vec3; 2] {
+    fn sums<const N: usize>(nodes: &[Vec3], s: f64) -> [Vec3; 2] {
+        let shape = ShapeAt::<N>::new(s);
+        [shape.values, shape.slopes].map(|factors| weighted_sum(&factors, |i| nodes[i]))
+    }
+    match nodes.len() {
+        2 => sums::<2>(nodes, s),
+        3 => sums::<3>(nodes, s),
+        _ => sums::<4>(nodes, s),
+    }
+}
+
+/// The angle between two vectors.
+fn angle(a: Vec3, b: Vec3) -> f64 {
+    libm::atan2(a.cross(b).norm(), a.dot(b))
+}
+
+/// The angle between two lines, up to a right angle.
+fn angle_of_lines(a: Vec3, b: Vec3) -> f64 {
+    libm::atan2(a.cross(b).norm(), a.dot(b).abs())
+}
+
+/// 0 below the first bound, 1 above the second one, between them a smooth step.
+fn smooth_part(value: f64, [low, high]: [f64; 2]) -> f64 {
+    let part = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    part * part * (3.0 - 2.0 * part)
+}
