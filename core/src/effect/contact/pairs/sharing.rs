@@ -183,7 +183,7 @@ impl PairsNow<'_> {
         let straight = self.place_and_slope(of, end)[1] * (to - end);
         let [_, beyond] = self.place_and_slope(next, 1.0 - end);
         let way = kink.beyond.dot(towards) * (point - kink.place).norm();
-        let walked = kink.beyond * way.clamp(0.0, beyond.norm());
+        let walked = kink.beyond * way.max(0.0).min(beyond.norm());
         kink.place + straight * inside + walked * (1.0 - inside)
     }
 
