@@ -387,6 +387,100 @@ fn penalties_do_not_jump_where_contacts_pass_nodes() {
     assert!(jumps.iter().all(|&case| case == 38), "{jumps:?}");
 }
 
+/// A rope whose ends are pulled down and aside beside a thick beam, which it slides over.
+fn pulled_over_beam(random: &mut Random) -> String {
+    let [rope, drum] = [random.range(0.02, 0.06), random.range(0.05, 0.2)];
+    let elements = random.range(12.0, 48.99) as usize;
+    let friction = random.range(-0.5, 0.5).max(0.0);
+    let bending = 10f64.powf(random.range(-2.5, -1.0));
+    let slant = random.range(-0.6, 0.6);
+    let parts = random.range(1.0, 5.99) as usize;
+    let height = rope + drum + 0.01;
+    let motions: String = [("start", [0.5, 0.1, -1.0]), ("end", [-0.6, 0.1, -0.8])]
+        .iter()
+        .flat_map(|(end, way)| {
+            ["ux", "uy", "uz"]
+                .iter()
+                .zip(way)
+                .map(move |(key, value)| format!("[[motion]]\nat = \"rope@{end}\"\n{key} = {value}\nhistory = \"h\"\n"))
+        })
+        .collect();
+    format!(
+        r#"
+[section.s]
+EA = 1e3
+GA = 500
+GJ = {bending}
+EI = {bending}
+rhoA = 1
+rhoJ = [1e-3, 5e-4, 5e-4]
+[section.d]
+EA = 1e6
+GA = 1e6
+GJ = 1e3
+EI = 1e3
+rhoA = 10
+rhoJ = [0.1, 0.05, 0.05]
+[[beam]]
+name = "rope"
+section = "s"
+through = [[-1, 0, {height}], [1.13, 0, {height}]]
+elements = {elements}
+[[beam]]
+name = "drum"
+section = "d"
+through = [[{}, -1, 0], [{slant}, 1, 0]]
+elements = {parts}
+[[support]]
+at = "drum@start"
+fix = "all"
+[[support]]
+at = "drum@end"
+fix = "all"
+{motions}
+[history.h]
+times = [0, 4]
+values = [0, 1]
+smooth = true
+[damping]
+mass = 2
+stiffness = 0.005
+[[contact]]
+name = "c"
+beams = ["rope"]
+with = ["drum"]
+radius = {{ rope = {rope}, drum = {drum} }}
+friction = {friction}
+stiffness = 300
+penetration = 0.05
+[[stage]]
+kind = "dynamic"
+end = 4.5
+step = 0.01
+scheme = "generalized_alpha"
+rho_inf = 0.5
+[output]
+nodes = ["rope@end"]
+columns = ["u", "contact", "energy"]
+"#,
+        -slant
+    )
+}
+
+#[test]
+fn ropes_slide_over_beams_in_whole_time_steps() {
+    let mut random = Random::new(88);
+    for case in 0..8 {
+        let text = pulled_over_beam(&mut random);
+        let simulation = simulate(&text);
+        let [lost, given] = ["energy.total", "energy.external"].map(|column| simulation.end(column));
+        let cutbacks = simulation.counters.cutbacks;
+        println!("{case}: {cutbacks} cut-backs, {lost} of {given}");
+        assert!(cutbacks < 3, "{case}: {cutbacks} cut-backs\n{text}");
+        assert!(simulation.end("c.normal") > 0.1 && lost.abs() < 0.01 * given, "{case}: {lost} of {given}\n{text}");
+    }
+}
+
 /// A bar that is held at its ends, and one that flies at it.
 fn shot(first: &Bar, second: &Bar, velocity: Vec3, step: f64, end: f64) -> String {
     let [x, y, z] = velocity.0;
