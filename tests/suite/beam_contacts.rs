@@ -481,6 +481,34 @@ fn ropes_slide_over_beams_in_whole_time_steps() {
     }
 }
 
+/// A contact without a pair in reach beside one whose pairs are listed from far away, since they
+/// approach fast.
+#[test]
+fn gaps_are_known_beside_a_list_of_a_wide_margin() {
+    let bar = |name: &str, y: f64, z: f64| {
+        format!(
+            "[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = [[{y}, 0, {z}], [{y}, 1, {z}]]\nelements = 4\n"
+        )
+    };
+    let text = [
+        "[section.s]\nEA = 200\nGA = 100\nGJ = 1\nEI = 1\nrhoA = 1\nrhoJ = [2e-3, 1e-3, 1e-3]\n".to_string(),
+        [bar("a", 0.0, 0.0), bar("b", 0.0, 3.0), bar("c", 20.0, 0.0), bar("d", 20.0, 30.0)].concat(),
+        ["a", "c", "d"].map(|at| format!("[[support]]\nat = \"{at}@start\"\nfix = \"all\"\n")).concat(),
+        "[[initial]]\nbeam = \"b\"\nvelocity = [0, 0, -8]\n".into(),
+        [("near", "a", "b"), ("far", "c", "d")]
+            .map(|(name, a, b)| {
+                format!("[[contact]]\nname = \"{name}\"\nbeams = [\"{a}\"]\nwith = [\"{b}\"]\nradius = 0.05\n")
+            })
+            .concat(),
+        "[[stage]]\nkind = \"dynamic\"\nend = 0.3\nstep = 0.02\n".into(),
+        "[output]\nnodes = [\"a@start\"]\ncolumns = [\"contact\"]\n".into(),
+    ]
+    .concat();
+    let simulation = simulate(&text);
+    assert!((simulation.end("near.gap") - 0.5).abs() < 1e-9, "{}", simulation.end("near.gap"));
+    assert!((simulation.end("far.gap") - 29.9).abs() < 1e-9, "{}", simulation.end("far.gap"));
+}
+
 /// A bar that is held at its ends, and one that flies at it.
 fn shot(first: &Bar, second: &Bar, velocity: Vec3, step: f64, end: f64) -> String {
     let [x, y, z] = velocity.0;

@@ -84,8 +84,7 @@ pub struct PairLaw {
     pub(crate) carrier: usize,
     /// True for parameters s of A and e of B that are those of the closest points; others stay
     pub(crate) free: [bool; 2],
-    /// Part of the force that this pair stands for: the weight of a rule, or of a blend. Frozen in a
-    /// step.
+    /// Part of the force that this pair stands for. The tangent leaves out how it changes.
     pub(crate) weight: f64,
 }
 

@@ -82,7 +82,7 @@ pub(super) struct PairsNow<'a> {
     /// The list, which is that of the state but in an assembly of another one
     pub(super) list: &'a [ListedPair],
     pub(super) places: Vec<Vec3>,
-    /// Directions of the beams at all nodes at the last converged state
+    /// Directions of the beams at all nodes at the last converged state, or of now where it has none
     pub(super) directions: Cow<'a, [Vec3]>,
 }
 
@@ -107,7 +107,10 @@ impl<'a> PairsNow<'a> {
     pub fn new(pairs: &'a BeamPairs, laws: &'a [ContactLaws], at: &'a State, list: &'a [ListedPair]) -> Self {
         let places = if list.is_empty() { Vec::new() } else { pairs.places(at) };
         let known = &at.contacts.pairs;
-        let directions = if known.directions.len() == places.len() {
+        // Without pairs there are no places.
+        let directions = if list.is_empty() {
+            Cow::Borrowed(&[][..])
+        } else if known.directions.len() == places.len() {
             Cow::Borrowed(&known.directions[..])
         } else {
             Cow::Owned(pairs.directions(&places))
