@@ -500,12 +500,12 @@ fn gaps_are_known_beside_a_list_of_a_wide_margin() {
                 format!("[[contact]]\nname = \"{name}\"\nbeams = [\"{a}\"]\nwith = [\"{b}\"]\nradius = 0.05\n")
             })
             .concat(),
-        "[[stage]]\nkind = \"dynamic\"\nend = 0.3\nstep = 0.02\n".into(),
+        "[[stage]]\nkind = \"dynamic\"\nend = 0.32\nstep = 0.02\n".into(),
         "[output]\nnodes = [\"a@start\"]\ncolumns = [\"contact\"]\n".into(),
     ]
     .concat();
     let simulation = simulate(&text);
-    assert!((simulation.end("near.gap") - 0.5).abs() < 1e-9, "{}", simulation.end("near.gap"));
+    assert!((simulation.end("near.gap") - 0.34).abs() < 1e-9, "{}", simulation.end("near.gap"));
     assert!((simulation.end("far.gap") - 29.9).abs() < 1e-9, "{}", simulation.end("far.gap"));
 }
 
