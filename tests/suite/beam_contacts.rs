@@ -485,10 +485,8 @@ fn ropes_slide_over_beams_in_whole_time_steps() {
 /// approach fast.
 #[test]
 fn gaps_are_known_beside_a_list_of_a_wide_margin() {
-    let bar = |name: &str, y: f64, z: f64| {
-        format!(
-            "[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = [[{y}, 0, {z}], [{y}, 1, {z}]]\nelements = 4\n"
-        )
+    let bar = |name: &str, x: f64, z: f64| {
+        Bar { ends: [Vec3([x, 0.0, z]), Vec3([x, 1.0, z])], elements: 4, order: 1, radius: 0.05 }.deck(name)
     };
     let text = [
         "[section.s]\nEA = 200\nGA = 100\nGJ = 1\nEI = 1\nrhoA = 1\nrhoJ = [2e-3, 1e-3, 1e-3]\n".to_string(),

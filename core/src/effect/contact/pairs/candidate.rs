@@ -110,7 +110,7 @@ fn is_inside(s: f64) -> bool {
     s > AT_NODE && s < 1.0 - AT_NODE
 }
 
-/// The kinds of points that a pair of elements has.
+/// The kinds of points that a pair of elements may have.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kinds {
     /// Closest points of both
@@ -127,8 +127,7 @@ impl Kinds {
 /// The part of the force at a node of one of two elements side by side.
 const OF_NODE: f64 = 0.5;
 
-/// Adds the candidates of two elements, with the weights of beams that cross, and of beams side by
-/// side.
+/// Adds the candidates of two elements: closest points with the weight 1, nodes with a half.
 pub(super) fn candidates<const NA: usize, const NB: usize>(
     a: &Side<NA>,
     b: &Side<NB>,

@@ -242,15 +242,16 @@ impl<'a> PairsNow<'a> {
         if strands.iter().all(|strand| strand.order == 1) {
             return bound;
         }
-        let orders = strands.map(|strand| strand.order);
-        let distance = |candidate: &PairCandidate| of_orders!(orders, self.distance(pair, candidate.at));
-        let distances = self.candidates(pair, Kinds::ALL).iter().map(distance).fold(f64::INFINITY, f64::min);
-        distances - strands[0].radius - strands[1].radius
+        let candidates = self.candidates(pair, Kinds::ALL);
+        let distances = candidates.iter().map(|candidate| self.distance(pair, candidate.at));
+        distances.fold(f64::INFINITY, f64::min) - strands[0].radius - strands[1].radius
     }
 
-    fn distance<const NA: usize, const NB: usize>(&self, pair: &ListedPair, [s, e]: [f64; 2]) -> f64 {
-        let [a, b] = self.pairs.elements_of(pair);
-        (self.side::<NA>(a).place(s) - self.side::<NB>(b).place(e)).norm()
+    /// The distance of the centre lines between two places of a pair.
+    pub(super) fn distance(&self, pair: &ListedPair, at: [f64; 2]) -> f64 {
+        let elements = self.pairs.elements_of(pair);
+        let [a, b] = [0, 1].map(|side| self.place_and_slope(elements[side], at[side])[0]);
+        (a - b).norm()
     }
 
     /// True if a point continues one in memory.
@@ -403,7 +404,7 @@ impl<'a> PairsNow<'a> {
             if shifts.iter().any(|&shift| shift > LARGEST_SHIFT) {
                 continue;
             }
-            let is_same = point.kind == candidate.kind && is_near(candidate.kind, shifts, LARGEST_SHIFT);
+            let is_same = point.kind == candidate.kind && is_near(candidate.kind, shifts);
             let relation = if is_same { Relation::Same } else { Relation::Beside };
             links.push(Link { candidate: 0, point: first + j, relation, shift: shifts[0] + shifts[1] });
         }
@@ -411,13 +412,13 @@ impl<'a> PairsNow<'a> {
     }
 }
 
-/// True for places along both beams, in elements, that one point may have: at the same node, or
-/// within `most` of each other.
-fn is_near(kind: PairPointKind, shifts: [f64; 2], most: f64) -> bool {
+/// True for places along both beams, in elements, that one point may have in two states: at the same
+/// node, or near each other.
+fn is_near(kind: PairPointKind, shifts: [f64; 2]) -> bool {
     let is_same_node = match kind {
         PairPointKind::Closest => true,
         PairPointKind::NodeOfFirst => shifts[0] == 0.0,
         PairPointKind::NodeOfSecond => shifts[1] == 0.0,
     };
-    is_same_node && shifts.iter().all(|&shift| shift <= most)
+    is_same_node && shifts.iter().all(|&shift| shift <= LARGEST_SHIFT)
 }

@@ -29,7 +29,7 @@ const LARGEST_OFFSET: f64 = 0.15;
 
 /// The cosine of the angle between a kink and a point up to which the point is beside the kink,
 /// neither inside nor outside.
-const BESIDE: f64 = 0.5;
+const COSINE_BESIDE: f64 = 0.5;
 
 impl BeamPairs {
     /// Unit tangents of centre lines at all nodes: where elements meet, the mean of both.
@@ -59,22 +59,23 @@ impl PairsNow<'_> {
     /// The candidates of a pair with the parts of the force that they carry. `reach`: the largest gap
     /// with a force.
     pub(super) fn sharing_candidates(&self, pair: &ListedPair, reach: f64) -> Vec<PairCandidate> {
-        let mut candidates = self.candidates(pair, self.kinds_of(pair));
+        let kinds = self.kinds_of(pair);
+        let share_by_angle = kinds.closest && kinds.nodes;
+        let share_at_kinks = self.at.contacts.regime == ContactRegime::Penalty;
+        let [a, b] = self.pairs.both(pair.meeting as usize);
+        let farthest = reach + a.radius + b.radius;
+        let mut candidates = self.candidates(pair, kinds);
         candidates.retain_mut(|candidate| {
-            candidate.weight *= self.part_by_angle(pair, candidate);
-            if self.at.contacts.regime == ContactRegime::Penalty && self.gap_of(pair, candidate) <= reach {
-                candidate.weight *= self.part_beside_kinks(pair, candidate);
+            if share_by_angle {
+                candidate.weight *= self.share_by_angle(pair, candidate);
+            }
+            // Points beyond have no force to share.
+            if share_at_kinks && self.distance(pair, candidate.at) <= farthest {
+                candidate.weight *= self.share_at_kinks(pair, candidate);
             }
             candidate.weight > 0.0
         });
         candidates
-    }
-
-    fn gap_of(&self, pair: &ListedPair, candidate: &PairCandidate) -> f64 {
-        let elements = self.pairs.elements_of(pair);
-        let [a, b] = [0, 1].map(|side| self.place_and_slope(elements[side], candidate.at[side])[0]);
-        let [first, second] = self.pairs.both(pair.meeting as usize);
-        (a - b).norm() - first.radius - second.radius
     }
 
     /// The kinds of points that a pair may have, by the angles between its elements.
@@ -93,7 +94,7 @@ impl PairsNow<'_> {
     /// The part of the force of a candidate of its kind. Penalties share the force of the same gap.
     /// Multipliers close the gap of each point whatever its weight, which only makes its stiffness
     /// smaller: a point of small weight would take many augmentations.
-    fn part_by_angle(&self, pair: &ListedPair, candidate: &PairCandidate) -> f64 {
+    fn share_by_angle(&self, pair: &ListedPair, candidate: &PairCandidate) -> f64 {
         let [a, b] = self.pairs.elements_of(pair);
         let [a, b] = [self.direction(a, candidate.at[0]), self.direction(b, candidate.at[1])];
         let closest = self.part_of_closest(pair, angle_of_lines(a, b));
@@ -117,6 +118,7 @@ impl PairsNow<'_> {
         let is_straight = strands.iter().all(|strand| strand.order == 1);
         match self.at.contacts.regime {
             ContactRegime::Augmented if is_straight => {
+                // Of undeformed elements: what acts does not change with their stretch in an iteration.
                 let of_side = |side: usize| strands[side].element_length(pair.elements[side] as usize);
                 let across = of_side(0).min(of_side(1)) * libm::sin(angle.clamp(0.0, FRAC_PI_2));
                 let offset = across / (strands[0].radius + strands[1].radius);
@@ -137,7 +139,7 @@ impl PairsNow<'_> {
 
     /// The inside of a kink has closest points on both sides of it, of which one begins and ends at
     /// the kink while the other one has a force. Penalties share it by their ways to the kink.
-    fn part_beside_kinks(&self, pair: &ListedPair, candidate: &PairCandidate) -> f64 {
+    fn share_at_kinks(&self, pair: &ListedPair, candidate: &PairCandidate) -> f64 {
         let elements = self.pairs.elements_of(pair);
         let of_side = |side: usize| {
             let other = 1 - side;
@@ -147,8 +149,8 @@ impl PairsNow<'_> {
                     self.place_and_slope(elements[other], candidate.at[other])[0]
                 }
             };
-            let part_at = |end: f64| self.part_inside(elements[side], end, &seen_from);
-            part_at(0.0) * part_at(1.0)
+            let share_at = |end: f64| self.share_at_kink(elements[side], end, &seen_from);
+            share_at(0.0) * share_at(1.0)
         };
         match candidate.kind {
             PairPointKind::Closest => of_side(0) * of_side(1),
@@ -159,13 +161,14 @@ impl PairsNow<'_> {
 
     /// The part of a force that an element carries beside the kink at one of its ends, 0 or 1. Seen
     /// from the point of the other beam that belongs to the kink, the feet on both sides of it have the
-    /// ways d_1 and d_2 to the kink: d_1/(d_1 + d_2) if both exist.
-    fn part_inside(&self, of: ElementOf, end: f64, seen_from: &dyn Fn(Vec3) -> Vec3) -> f64 {
+    /// ways d_1 and d_2 to the kink: d_1/(d_1 + d_2), and all where one of them does not exist.
+    fn share_at_kink(&self, of: ElementOf, end: f64, seen_from: &dyn Fn(Vec3) -> Vec3) -> f64 {
         let Some(next) = self.neighbour(of, end) else { return 1.0 };
         let kink = self.kink(of, end, next);
-        let apart = seen_from(kink.place) - kink.place;
-        let [own, others] = [-kink.own.dot(apart), kink.beyond.dot(apart)];
-        if own + others > 0.0 { (own / (own + others)).clamp(0.0, 1.0) } else { 1.0 }
+        let from_kink = seen_from(kink.place) - kink.place;
+        let ways = [-kink.own.dot(from_kink), kink.beyond.dot(from_kink)];
+        let both = ways[0] + ways[1];
+        if both > 0.0 { (ways[0] / both).clamp(0.0, 1.0) } else { 1.0 }
     }
 
     /// The place of a beam nearest to a point, looked for from a place on one of its elements. It goes on
@@ -178,22 +181,27 @@ impl PairsNow<'_> {
         let next = if to == end { None } else { self.neighbour(of, end) };
         let Some(next) = next else { return self.place_and_slope(of, end)[0] };
         let kink = self.kink(of, end, next);
-        let [towards, turn] = [point - kink.place, kink.turn()].map(|vector| vector.normalized().unwrap_or(Vec3::ZERO));
-        let inside = smooth_part(towards.dot(turn), [-BESIDE, BESIDE]);
-        let straight = self.place_and_slope(of, end)[1] * (to - end);
-        let [_, beyond] = self.place_and_slope(next, 1.0 - end);
-        let way = kink.beyond.dot(towards) * (point - kink.place).norm();
-        let walked = kink.beyond * way.max(0.0).min(beyond.norm());
+        let from_kink = point - kink.place;
+        let [towards, turn] = [from_kink, kink.turn()].map(|vector| vector.normalized().unwrap_or(Vec3::ZERO));
+        let inside = smooth_part(towards.dot(turn), [-COSINE_BESIDE, COSINE_BESIDE]);
+        let straight = kink.slope * (to - end).abs();
+        let walked = kink.beyond * kink.beyond.dot(from_kink).max(0.0).min(kink.length_beyond);
         kink.place + straight * inside + walked * (1.0 - inside)
     }
 
     /// The kink between an element, at its end 0 or 1, and the one beyond.
     fn kink(&self, of: ElementOf, end: f64, next: ElementOf) -> Kink {
         let [place, slope] = self.place_and_slope(of, end);
-        let [_, beyond] = self.place_and_slope(next, 1.0 - end);
-        let out = if end == 1.0 { 1.0 } else { -1.0 };
-        let [own, beyond] = [slope, beyond].map(|slope| slope.normalized().unwrap_or(Vec3::ZERO) * out);
-        Kink { place, own, beyond }
+        let [_, slope_beyond] = self.place_and_slope(next, 1.0 - end);
+        let outward = if end == 1.0 { 1.0 } else { -1.0 };
+        let unit = |slope: Vec3| slope.normalized().unwrap_or(Vec3::ZERO) * outward;
+        Kink {
+            place,
+            slope: slope * outward,
+            own: unit(slope),
+            beyond: unit(slope_beyond),
+            length_beyond: slope_beyond.norm(),
+        }
     }
 
     /// The element beyond an end of an element, 0 or 1.
@@ -205,7 +213,7 @@ impl PairsNow<'_> {
         (!is_last || strand.is_closed()).then(|| ElementOf { element: (of.element + step) % count, ..of })
     }
 
-    fn place_and_slope(&self, of: ElementOf, s: f64) -> [Vec3; 2] {
+    pub(super) fn place_and_slope(&self, of: ElementOf, s: f64) -> [Vec3; 2] {
         place_and_slope(self.pairs.of_element(of, &self.places), s)
     }
 }
@@ -213,10 +221,14 @@ impl PairsNow<'_> {
 /// Where two elements of a beam meet.
 struct Kink {
     place: Vec3,
+    /// Derivative of the place on the first element, away from it
+    slope: Vec3,
     /// Unit tangent of the first element, away from it
     own: Vec3,
     /// Unit tangent of the next element, into it
     beyond: Vec3,
+    /// The length of the next element as it begins
+    length_beyond: f64,
 }
 
 impl Kink {
