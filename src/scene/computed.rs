@@ -9,7 +9,7 @@ use crate::deck::{
 };
 use beamsim_core::model::{MassPerLength, SectionMatrices};
 use beamsim_core::section::airfoil;
-use beamsim_core::section::analysis::{self, Analysis, DEFAULT_AIM, MeshAim, SectionWarning, analyse};
+use beamsim_core::section::analysis::{self, Analysis, MeshAim, SectionWarning, analyse};
 use beamsim_core::section::geometry::{self, Geometry, Profile};
 use beamsim_core::section::grid::Rect;
 use beamsim_core::section::material::{self, Material};
@@ -99,7 +99,7 @@ fn solve(section: &deck::Section, body: &ComputedSection, deck: &Deck) -> Result
     let shape = draft.shape()?;
     let geometry = Geometry::new(shape);
     let aim = match body.mesh {
-        None => MeshAim::Error(DEFAULT_AIM),
+        None => MeshAim::Usual,
         Some(deck::MeshAim::Error(error)) => MeshAim::Error(error),
         Some(deck::MeshAim::Size(size)) => MeshAim::Size(size),
     };
@@ -126,13 +126,15 @@ pub fn warning(section: &deck::Section, deck: &Deck) -> Option<Diagnostic> {
             format!("the stiffness of section `{}` has an estimated relative error of {estimate:.1e}", name.value)
         }
         SectionWarning::AimNotMet { estimate } => format!(
-            "the stiffness of section `{}` has an estimated relative error of {estimate:.1e}, more than `mesh` asks \
-             for: a finer mesh would have too many nodes",
+            "the stiffness of section `{}` has an estimated relative error of {estimate:.1e}, more than aimed at: \
+             a finer mesh would take long",
             name.value
         ),
     };
     let diagnostic = Diagnostic::warning(WarningKind::CoarseSection, message, name.span.clone());
-    Some(diagnostic.help("ask for less by `mesh`, or round off sharp corners that point into the material"))
+    let help = "round off sharp corners that point into the material, or give `mesh`: a larger error needs fewer nodes, \
+                and with `mesh = 1e-3` meshes may have three times as many as without `mesh`";
+    Some(diagnostic.help(help))
 }
 
 /// The solution of a geometry: computed once a process.

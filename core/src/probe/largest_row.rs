@@ -256,7 +256,7 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::section::analysis::{DEFAULT_AIM, MeshAim, analyse};
+    use crate::section::analysis::{MeshAim, analyse};
     use crate::section::closed::{ClosedForm, ClosedShape};
     use crate::section::geometry::{Geometry, Profile, Shape};
     use crate::section::material::Material;
@@ -292,7 +292,7 @@ mod tests {
         let profile = Profile::I { d: 2.0, b: 1.0, t_f: 0.1, t_w: 0.06, r: 0.0, b_top: 1.0, t_f_top: 0.1 };
         let geometry = Geometry::new(Shape::Profile { profile, region: Region::new("i", 0) });
         let materials = [Material::isotropic("steel", 1.0, 0.3, 1.0)];
-        let analysis = analyse(&geometry, &materials, MeshAim::Error(DEFAULT_AIM)).expect("a section");
+        let analysis = analyse(&geometry, &materials, MeshAim::Usual).expect("a section");
         let field = analysis.stresses(&materials).expect("stresses");
         let law = FailureLaw { yield_stress: Some(2.0), ..FailureLaw::default() };
         let section = Recovery::computed("i", field, Placement::default(), Corners::Exclude, &[Some(law)]);

@@ -18,8 +18,11 @@ pub const DEFAULT_AIM: f64 = 1e-3;
 /// Estimates above this deserve a warning
 pub const POOR_ESTIMATE: f64 = 1e-2;
 
-/// Refinement ends before meshes of more nodes
+/// Refinement ends before meshes of more nodes where an aim is given: up to 20 s for laminates
 const MAX_NODES: usize = 60_000;
+
+/// Refinement ends before meshes of more nodes where no aim is given: up to 3 s for laminates
+const MAX_NODES_UNASKED: usize = 20_000;
 
 /// Order of convergence that estimates count on. Smooth sections converge with order 4, corners
 /// between materials with less than 2.
@@ -117,6 +120,8 @@ impl StressField {
 /// The aim of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MeshAim {
+    /// The error [`DEFAULT_AIM`], without the largest meshes
+    Usual,
     /// Estimated error of the stiffness, relative to the root of the products of diagonals
     Error(f64),
     /// Longest side of an element
@@ -163,15 +168,18 @@ impl Computed {
         difference / (libm::pow(refinement, ASSUMED_ORDER) - 1.0)
     }
 
-    /// The most levels by which a finer mesh has no more than the largest number of nodes.
-    fn possible_jump(&self) -> usize {
+    /// The most levels by which a finer mesh has no more than a number of nodes.
+    fn possible_jump(&self, max_nodes: usize) -> usize {
         let nodes = |jump: usize| self.mesh.nodes.len() as f64 * REFINEMENT.powi(2 * jump as i32);
-        (1..=MAX_JUMP).rev().find(|&jump| nodes(jump) <= MAX_NODES as f64).unwrap_or(0)
+        (1..=MAX_JUMP).rev().find(|&jump| nodes(jump) <= max_nodes as f64).unwrap_or(0)
     }
 
     fn finish(self, geometry: &Geometry, aim: MeshAim, estimate: f64, meets_aim: bool) -> Analysis {
         let Self { mesh, solution, level } = self;
-        let refines_stresses = matches!(aim, MeshAim::Error(_));
+        let refines_stresses = match aim {
+            MeshAim::Usual | MeshAim::Error(_) => true,
+            MeshAim::Size(_) => false,
+        };
         let geometry = geometry.clone();
         Analysis { mesh, solution, estimate, meets_aim, level, geometry, refines_stresses, stresses: OnceLock::new() }
     }
@@ -185,14 +193,16 @@ pub fn analyse(geometry: &Geometry, materials: &[Material], aim: MeshAim) -> Res
     loop {
         let finer = Computed::new(geometry, materials, coarser.level + jump)?;
         let estimate = finer.estimate(&coarser);
-        let wanted_jump = match aim {
-            MeshAim::Error(error) => libm::log(estimate / error) / (PREDICTED_ORDER * libm::log(REFINEMENT)),
-            MeshAim::Size(size) => libm::log(finer.mesh.longest_side() / size) / libm::log(REFINEMENT),
+        let jump_to = |error: f64| libm::log(estimate / error) / (PREDICTED_ORDER * libm::log(REFINEMENT));
+        let (wanted_jump, max_nodes) = match aim {
+            MeshAim::Usual => (jump_to(DEFAULT_AIM), MAX_NODES_UNASKED),
+            MeshAim::Error(error) => (jump_to(error), MAX_NODES),
+            MeshAim::Size(size) => (libm::log(finer.mesh.longest_side() / size) / libm::log(REFINEMENT), MAX_NODES),
         };
         if wanted_jump <= 0.0 {
             return Ok(finer.finish(geometry, aim, estimate, true));
         }
-        jump = finer.possible_jump().min(wanted_jump.ceil() as usize);
+        jump = finer.possible_jump(max_nodes).min(wanted_jump.ceil() as usize);
         if jump == 0 {
             return Ok(finer.finish(geometry, aim, estimate, false));
         }

@@ -345,6 +345,31 @@ fn a_mesh_may_be_given_by_size() {
     assert!(!analysis.meets_aim && analysis.warnings().len() == 1);
 }
 
+/// A ply that is a million times as soft in one shear needs very fine meshes.
+#[test]
+fn the_largest_meshes_are_only_made_where_an_aim_is_given() {
+    let elastic = Elastic::Orthotropic { e: [20.59e6, 1.42e6, 1.42e6], g: [0.87e6, 0.87e6, 1.0], nu: [0.3, 0.3, 0.34] };
+    let materials = vec![Material { name: "ply".to_string(), elastic, density: 1.0 }];
+    let plies: Vec<Ply> = [15.0, -15.0].map(|degrees| ply("ply", 0.015, degrees)).into();
+    let corners = [[-0.48, 0.27], [0.48, 0.27], [0.48, -0.27], [-0.48, -0.27]];
+    let mut walls = Walls::default();
+    for k in 0..4 {
+        walls.add(corners[k], corners[(k + 1) % 4], None, 0.0, &plies);
+    }
+    let geometry = Geometry::new(Shape::Walls(walls));
+    let usual = analyse(&geometry, &materials, MeshAim::Usual).unwrap();
+    let asked = analyse(&geometry, &materials, MeshAim::Error(DEFAULT_AIM)).unwrap();
+    println!(
+        "{} nodes {:.1e}, {} nodes {:.1e}",
+        usual.mesh.nodes.len(),
+        usual.estimate,
+        asked.mesh.nodes.len(),
+        asked.estimate
+    );
+    assert!(!usual.meets_aim && usual.mesh.nodes.len() <= 20_000 && usual.estimate < 2e-2);
+    assert!(asked.mesh.nodes.len() > 20_000 && asked.estimate < usual.estimate);
+}
+
 #[test]
 fn impossible_sections_are_explained() {
     let thin = profile(Profile::Box { d: 1.0, b: 1.0, t_f: 1e-4, t_w: 1e-4, r_out: 0.0 });
