@@ -546,6 +546,85 @@ fn levels_with_friction_are_in_equilibrium() {
     }
 }
 
+/// A rod that is clamped at `root` lies on a drum, which is turned in the second stage.
+const RUBBED_ROD: &str = r#"
+[point]
+root = [-1, 0, 0.25]
+tip = [0.5, 0, 0.25]
+
+[section.rod]
+EA = 1e5
+GA = 1e5
+GJ = 50
+EI = 10
+
+[[beam]]
+name = "rod"
+section = "rod"
+through = ["root", "tip"]
+elements = 6
+
+[[support]]
+at = "root"
+fix = "all"
+
+[[load]]
+at = "tip"
+force = [0, 0, -2]
+
+[[surface]]
+name = "drum"
+kind = "cylinder"
+from = [0, -1, 0]
+to = [0, 1, 0]
+radius = 0.2
+rotate = [0, 1, 0]
+about = [0, 0, 0]
+angle = "ANGLE"
+stages = [2]
+
+[[contact]]
+name = "rub"
+beams = ["rod"]
+surfaces = ["drum"]
+radius = 0.05
+friction = 0.3
+
+[[stage]]
+kind = "static"
+steps = 2
+
+[[stage]]
+kind = "static"
+steps = STEPS
+
+[output]
+nodes = ["root"]
+columns = ["reaction", "contact", "energy"]
+"#;
+
+/// A drum that is turned rubs by mu N against its sense and takes mu N times the way of its surface, also
+/// where a level has whole turns.
+#[test]
+fn whole_turns_of_a_surface_in_one_level_slide() {
+    for turns in [1.0_f64, -1.0, 1.5, -3.0] {
+        for steps in [1, 3] {
+            let deck = RUBBED_ROD.replace("ANGLE", &format!("{turns}*2*pi")).replace("STEPS", &steps.to_string());
+            let simulation = simulate(&deck);
+            let [normal, friction] = ["rub.normal", "rub.friction"].map(|column| simulation.end(column));
+            assert!((friction / normal - 0.3).abs() < 1e-9, "{turns} turns, {steps} levels: {friction}, {normal}");
+            assert_eq!((simulation.end("rub.fx") - 0.1).signum(), turns.signum(), "{turns} turns, {steps} levels");
+            let way = 0.2 * 2.0 * std::f64::consts::PI * turns.abs();
+            let part = simulation.end("energy.friction") / (friction * way);
+            println!("{turns} turns, {steps} levels: work {part:.4} of mu N times the way");
+            assert!((part - 1.0).abs() < 0.04);
+        }
+    }
+    let straight = RUBBED_ROD.replace("ANGLE", "2*pi").replace("steps = STEPS", "steps = 1\nadaptive = false");
+    let failure = attempt(&straight).result.unwrap_err();
+    assert!(failure.to_string().contains("surface \"drum\" is turned by 6.283 rad"), "{failure}");
+}
+
 /// A level that fails for one stiffness of its contacts is cut back with the stiffness that it began with: wires of
 /// any number of elements come through the first curve.
 #[test]

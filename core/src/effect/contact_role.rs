@@ -53,6 +53,10 @@ pub trait Contacts {
     /// apart.
     fn safe_part(&self, at: &State, increment: &[Vec3]) -> f64;
 
+    /// A surface that a prescribed rotation has turned too far for contact since amplitudes were `from`:
+    /// its name, and radians.
+    fn turned(&self, from: &[f64], at: &State) -> Option<(&str, f64)>;
+
     /// A slot of a node that may have passed through a surface on the way from one state to another.
     fn passed(&self, from: &State, to: &State) -> Option<Slot>;
 

@@ -25,7 +25,7 @@ pub use history::{History, NOTICED, Reading, Table};
 pub(crate) use linear::LinearisedSystem;
 pub use names::Names;
 pub use parts::ModelParts;
-pub use schedule::Schedule;
+pub use schedule::{Schedule, TooFar};
 pub use section::{MassPerLength, SectionMatrices};
 pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError};
 

@@ -16,6 +16,15 @@ const LARGEST_TURN: f64 = 0.75 * std::f64::consts::PI;
 /// and the sine above which axes differ.
 const NOT_ZERO: f64 = 1e-9;
 
+/// What a step would turn too far, by an angle in radians.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TooFar {
+    /// The node with a rotation
+    Node(Slot, f64),
+    /// The surface with a name
+    Surface(String, f64),
+}
+
 /// The courses of all loads and prescribed motions of a model. Plain data: with the state it is all
 /// of a scene that changes in a run.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -163,7 +172,7 @@ impl Schedule {
 
     /// Sets the clock and the load factor, the loads that belong to them, and the prescribed
     /// motions. Where a motion turns its node too far at once, its slot and the angle are returned.
-    pub fn set_clock(&self, model: &Model, state: &mut State, time: f64, load: f64) -> Option<(Slot, f64)> {
+    pub fn set_clock(&self, model: &Model, state: &mut State, time: f64, load: f64) -> Option<TooFar> {
         let before = state.amplitude.clone();
         (state.time, state.load) = (time, load);
         for (k, timeline) in self.loads(model).enumerate() {
@@ -171,16 +180,17 @@ impl Schedule {
             state.amplitude[k] = value;
             state.amplitude_rates[k] = [rate, rate2];
         }
-        let mut too_far = None;
+        let turned_surface = model.contacts().and_then(|contacts| contacts.turned(&before, state));
+        let mut too_far = turned_surface.map(|(surface, angle)| TooFar::Surface(surface.into(), angle));
         for turned in model.constraints().filter_map(|constraint| constraint.turned(&before, &state.amplitude)) {
             if turned.1 > LARGEST_TURN {
-                too_far = Some(turned);
+                too_far = Some(TooFar::Node(turned.0, turned.1));
             }
         }
         for (motion, timeline) in self.motions(model).filter(|(_, timeline)| timeline.acts()) {
             let angle = motion.impose(timeline.at(time, load), state);
             if angle > LARGEST_TURN {
-                too_far = Some((motion.slot, angle));
+                too_far = Some(TooFar::Node(motion.slot, angle));
             }
         }
         too_far

@@ -61,6 +61,15 @@ pub enum Failure {
         /// Attempts before it
         tried: Attempts,
     },
+    /// A surface is turned so far at once that the sliding of beams on it is unknown.
+    SurfaceTurnsTooFar {
+        /// When
+        at: Moment,
+        /// Its name
+        surface: String,
+        /// Radians
+        angle: f64,
+    },
     /// A node turns so far at once that nobody could tell which way.
     TurnsTooFar {
         /// When
@@ -205,6 +214,7 @@ impl Failure {
             Self::Deck(_) => FailureKind::Deck,
             Self::NotConverged { .. }
             | Self::TurnsTooFar { .. }
+            | Self::SurfaceTurnsTooFar { .. }
             | Self::LimitPoint { .. }
             | Self::StepTooSmall { .. }
             | Self::Penetration { .. } => FailureKind::NotConverged,
@@ -285,6 +295,13 @@ impl fmt::Display for Failure {
                     f,
                     "node \"{node}\" turns by {angle:.3} rad in one step ({at}): near half a turn and above, the \
                      direction of rotation is ambiguous"
+                )
+            }
+            Self::SurfaceTurnsTooFar { at, surface, angle } => {
+                write!(
+                    f,
+                    "surface \"{surface}\" is turned by {angle:.3} rad in one step ({at}): how far beams slide on it \
+                     would be unknown"
                 )
             }
             Self::LimitPoint { at, goal, increments, end } => write!(

@@ -14,7 +14,7 @@ impl Failure {
         let has = |at: &Moment| Has::new(plan, at.stage);
         match self {
             Self::NotConverged { at, tried, .. } => Some(has(at)?.hint_of_balance(tried)),
-            Self::TurnsTooFar { at, .. } => Some(has(at)?.hint_of_turns()),
+            Self::TurnsTooFar { at, .. } | Self::SurfaceTurnsTooFar { at, .. } => Some(has(at)?.hint_of_turns()),
             Self::LimitPoint { at, .. } => Some(has(at)?.hint_of_limit()),
             Self::StepTooSmall { at, .. } => {
                 let cures = [

@@ -40,6 +40,7 @@ impl StageRun<'_> {
             NewtonFailure::TurnsTooFar { slot, angle } => {
                 Failure::TurnsTooFar { at, node: self.model.node_at(slot), angle }
             }
+            NewtonFailure::SurfaceTurnsTooFar { surface, angle } => Failure::SurfaceTurnsTooFar { at, surface, angle },
             NewtonFailure::LeapsTooFar { element, angle } => self.name_coarse(element, angle),
             NewtonFailure::Penetrates { slot, depth } => {
                 Failure::Penetration { at, node: self.model.node_at(slot), depth }

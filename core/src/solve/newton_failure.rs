@@ -3,7 +3,7 @@
 use super::convergence::Residual;
 use super::softest::NullVector;
 use crate::interrupt;
-use crate::model::Assembly;
+use crate::model::{Assembly, TooFar};
 use crate::system::State;
 
 /// Reason why a step or level has no solution.
@@ -20,6 +20,13 @@ pub enum NewtonFailure {
     TurnsTooFar {
         /// Slot of the rotation
         slot: usize,
+        /// Angle of the increment in rad
+        angle: f64,
+    },
+    /// A prescribed rotation turns a surface too far for the contacts at it in one increment.
+    SurfaceTurnsTooFar {
+        /// Its name
+        surface: String,
         /// Angle of the increment in rad
         angle: f64,
     },
@@ -81,6 +88,15 @@ impl NewtonFailure {
         match assembly.culprit(state) {
             Some((effect, slot)) => Self::NotFinite { effect: Some(effect), slot },
             None => Self::NotFinite { effect: None, slot: 0 },
+        }
+    }
+}
+
+impl From<TooFar> for NewtonFailure {
+    fn from(too_far: TooFar) -> Self {
+        match too_far {
+            TooFar::Node(slot, angle) => Self::TurnsTooFar { slot: slot as usize, angle },
+            TooFar::Surface(surface, angle) => Self::SurfaceTurnsTooFar { surface, angle },
         }
     }
 }

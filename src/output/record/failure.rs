@@ -43,6 +43,7 @@ struct PlaceRecord {
 enum FailureNumbers {
     NotConverged { residual: Number, force: Number, iterations: usize, residual_history: Vec<Number>, cutbacks: u64 },
     TurnsTooFar { node: String, angle: Number },
+    SurfaceTurnsTooFar { surface: String, angle: Number },
     LimitPoint { goal: Number, arc_length_increments: u64, end: Number },
     StepTooSmall { error: Number, share: Number },
     Penetration { node: String, depth: Number },
@@ -87,6 +88,7 @@ fn moment_of(failure: &Failure) -> Option<&Moment> {
     match failure {
         Failure::NotConverged { at, .. }
         | Failure::TurnsTooFar { at, .. }
+        | Failure::SurfaceTurnsTooFar { at, .. }
         | Failure::LimitPoint { at, .. }
         | Failure::StepTooSmall { at, .. }
         | Failure::Singular { at, .. }
@@ -107,6 +109,7 @@ fn place_of(failure: &Failure) -> Option<&Place> {
         Failure::NotConverged { place, .. } | Failure::StepTooSmall { place, .. } => Some(place),
         Failure::Singular { place, .. } => place.as_ref(),
         Failure::TurnsTooFar { .. }
+        | Failure::SurfaceTurnsTooFar { .. }
         | Failure::LimitPoint { .. }
         | Failure::Penetration { .. }
         | Failure::ContactStart { .. }
@@ -133,6 +136,9 @@ fn numbers_of(failure: &Failure) -> Option<FailureNumbers> {
         },
         Failure::TurnsTooFar { node, angle, .. } => {
             FailureNumbers::TurnsTooFar { node: node.clone(), angle: Number(*angle) }
+        }
+        Failure::SurfaceTurnsTooFar { surface, angle, .. } => {
+            FailureNumbers::SurfaceTurnsTooFar { surface: surface.clone(), angle: Number(*angle) }
         }
         Failure::LimitPoint { goal, increments, end, .. } => FailureNumbers::LimitPoint {
             goal: Number(*goal),

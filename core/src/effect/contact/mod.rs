@@ -41,6 +41,13 @@ use std::sync::Arc;
 /// Factor of the first stiffness of points that are held in modal stages: about that of elements.
 const HELD: f64 = 1e4;
 
+/// The angle, in radians, by which a prescribed rotation may turn a surface in one step past beams
+/// that rub on it: the way of sliding is the chord of the true one, 1 % shorter for this angle.
+const LARGEST_TURN_IN_FRICTION: f64 = 0.25;
+
+/// The same where no beam rubs on the surface: beams are looked for along chords.
+const LARGEST_TURN: f64 = 1.0;
+
 /// All contacts with rigid surfaces, and of beams with each other.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceContacts {
@@ -510,6 +517,21 @@ impl Contacts for SurfaceContacts {
             }
         }
         deeper(deepest, self.pairs().hidden_penetration(at))
+    }
+
+    fn turned(&self, from: &[f64], at: &State) -> Option<(&str, f64)> {
+        let too_far = |number: usize| {
+            let chain = &self.chains[number];
+            let surface = &self.surfaces[chain.surface];
+            let angle = surface.turned(from, &at.amplitude);
+            if angle <= LARGEST_TURN_IN_FRICTION || !self.is_near(number, at) {
+                return None;
+            }
+            let touches = at.contacts.chains.get(number).is_some_and(|memory| !memory.points.is_empty());
+            let rubs = touches && self.laws[chain.contact].rubs();
+            (rubs || angle > LARGEST_TURN).then_some((surface.name.as_str(), angle))
+        };
+        (0..self.chains.len()).find_map(too_far)
     }
 
     fn passed(&self, from: &State, to: &State) -> Option<Slot> {

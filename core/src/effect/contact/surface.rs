@@ -48,6 +48,14 @@ pub enum SurfaceCarrier {
 }
 
 impl SceneSurface {
+    /// The angle of a prescribed rotation between two lists of amplitudes, in radians.
+    pub(super) fn turned(&self, from: &[f64], to: &[f64]) -> f64 {
+        match self.carrier {
+            SurfaceCarrier::Turn { amplitude, .. } => (to[amplitude] - from[amplitude]).abs(),
+            SurfaceCarrier::Ground | SurfaceCarrier::Node { .. } | SurfaceCarrier::Shift { .. } => 0.0,
+        }
+    }
+
     /// The carrier in a state, for the tangent of `weights`.
     pub(super) fn carrier(&self, at: &State, weights: Weights) -> Carrier {
         match self.carrier {

@@ -373,7 +373,7 @@ impl Dynamics<'_, '_> {
         }
         step.predict(state, self.last_length);
         match schedule.set_clock(model, state, next, 1.0) {
-            Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
+            Some(too_far) => Err(too_far.into()),
             None => Ok(()),
         }
     }

@@ -31,8 +31,8 @@ impl Dynamics<'_, '_> {
         }
         let start = state.time;
         for (state, time) in [(&mut *middle, start + MIDDLE * length), (&mut **state, next)] {
-            if let Some((slot, angle)) = schedule.set_clock(model, state, time, 1.0) {
-                return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
+            if let Some(too_far) = schedule.set_clock(model, state, time, 1.0) {
+                return Err(too_far.into());
             }
         }
         newton.solve_stages(model, assembly, middle, state, &step, &mut counters.work)?;

@@ -321,6 +321,7 @@ fn may_depend_on_stiffness(failure: &NewtonFailure) -> bool {
         NewtonFailure::LeapsTooFar { .. }
         | NewtonFailure::Leaves { .. }
         | NewtonFailure::TurnsTooFar { .. }
+        | NewtonFailure::SurfaceTurnsTooFar { .. }
         | NewtonFailure::NotFinite { .. }
         | NewtonFailure::StepTooSmall { .. }
         | NewtonFailure::Interrupted(_) => false,

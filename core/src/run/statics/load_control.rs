@@ -121,8 +121,8 @@ pub(in crate::run) fn set_load(
 ) -> Result<bool, NewtonFailure> {
     threads::copy(increment, if model.motions.is_empty() { &[] } else { &state.q });
     let time = state.time;
-    if let Some((slot, angle)) = schedule.set_clock(model, state, time, load) {
-        return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
+    if let Some(too_far) = schedule.set_clock(model, state, time, load) {
+        return Err(too_far.into());
     }
     for (increment, q) in increment.iter_mut().zip(&mut state.q) {
         let before = *increment;
