@@ -1,7 +1,7 @@
 //! Errors and warnings about stages that are found before anything is computed, with their places
 //! in the deck.
 
-use super::compose::DrivenTable;
+use super::compose::{DrivenTable, MOTION_OF_A_SURFACE};
 use crate::deck::{Deck, Diagnostic, HistoryBody, HistoryTable, Span};
 use beamsim_core::model::{StageError, StageKind};
 use beamsim_core::run::{Driven, HistoryJump, JumpKind, Plan, refusal, refusal_help, rehearse};
@@ -45,6 +45,7 @@ fn place<'t>(error: &StageError, tables: &'t [DrivenTable]) -> Option<&'t Span> 
     let driven = match error {
         StageError::Jump(jump) => Driven::Motion(jump.motion),
         StageError::MotorJump(jump) => Driven::Motor(jump.slot),
+        StageError::SurfaceJump(jump) => Driven::Amplitude(jump.amplitude),
         StageError::Conflict(_) | StageError::TurnedHinge(_) | StageError::NothingGrows(_) | StageError::NoMass => {
             return None;
         }
@@ -76,10 +77,10 @@ impl Teller<'_> {
         self.plan.stages[stage].work.kind()
     }
 
-    /// Motors that jump into a dynamic stage are refused, not warned of.
+    /// Motors and surfaces that jump into a dynamic stage are refused, not warned of.
     fn concerns(&self, jump: &HistoryJump, table: &DrivenTable) -> bool {
         let jumps = matches!(jump.how, JumpKind::Value { .. }) && self.kind(jump.stage).advances_time();
-        !(jumps && self.is_motor(table))
+        !(jumps && (self.is_motor(table) || table.what == MOTION_OF_A_SURFACE))
     }
 
     fn is_motor(&self, table: &DrivenTable) -> bool {

@@ -625,6 +625,198 @@ fn whole_turns_of_a_surface_in_one_level_slide() {
     assert!(failure.to_string().contains("surface \"drum\" is turned by 6.283 rad"), "{failure}");
 }
 
+/// A dynamic stage holds what a static one has pressed on a drum, with springs of any stiffness: the rod
+/// rubs by mu N against the sense of the drum, whose torque is mu N times its radius.
+#[test]
+fn friction_after_a_static_stage_is_that_of_the_true_radius() {
+    let deck = r#"
+[point]
+hub = [0, 0, 0]
+start = [-0.4, 0, 0.11]
+end = [0.2, 0, 0.11]
+
+[section.rod]
+EA = 1e6
+GA = 1e6
+GJ = 100
+EI = 100
+rhoA = 0.5
+rhoJ = [1e-3, 5e-4, 5e-4]
+
+[[body]]
+at = "hub"
+mass = 1
+inertia = [0.1, 0.1, 0.1]
+
+[[beam]]
+name = "rod"
+section = "rod"
+through = ["start", "end"]
+elements = 6
+
+[[support]]
+at = "start"
+fix = "all"
+
+[[support]]
+at = "hub"
+fix = ["ux", "uy", "uz"]
+
+[[support]]
+at = "hub"
+fix = ["rx", "ry", "rz"]
+stages = [1]
+
+[[load]]
+at = "end"
+force = [0, 0, -10]
+
+[[motion]]
+at = "hub"
+rotate = [0, 1, 0]
+angle = 1
+history = { name = "spin", stages = [2] }
+stages = [2]
+
+[history.spin]
+expr = "2*t"
+
+[damping]
+mass = 5
+
+[[surface]]
+name = "drum"
+kind = "cylinder"
+from = [0, -1, 0]
+to = [0, 1, 0]
+radius = 0.1
+on = "hub"
+
+[[contact]]
+name = "rub"
+beams = ["rod"]
+surfaces = ["drum"]
+radius = 0.01
+friction = 0.3
+stiffness = STIFFNESS
+
+[[stage]]
+kind = "static"
+steps = 2
+
+[[stage]]
+kind = "dynamic"
+end = 1
+step = 0.005
+scheme = "generalized_alpha"
+rho_inf = 0.5
+
+[output]
+nodes = ["hub"]
+columns = ["reaction", "contact", "energy"]
+"#;
+    for stiffness in ["60", "200", "1e4", "1e6"] {
+        let simulation = simulate(&deck.replace("STIFFNESS", stiffness));
+        let [normal, friction, along, torque] =
+            ["normal", "friction", "fx", "my"].map(|column| simulation.end(&format!("rub.{column}")));
+        println!("{stiffness}: N {normal}, friction {friction}, along {along}, torque {torque}");
+        assert!((friction / normal - 0.3).abs() < 1e-9 && along > 0.0, "{stiffness}: {friction}, {normal}");
+        assert!((torque / friction - 0.1).abs() < 2e-4, "{stiffness}: {torque}");
+    }
+}
+
+/// A rod that meets a thin surface fast either comes back or ends the run, whatever the places of its nodes.
+#[test]
+fn beams_and_bodies_pass_through_no_round_surface() {
+    let mut random = Random::new(11);
+    let shapes = [
+        "kind = \"cylinder\"\nfrom = [-1, 0, 0]\nto = [1, 0, 0]\nradius = 0.004",
+        "kind = \"capsule\"\nfrom = [-0.1, 0, 0]\nto = [0.1, 0, 0]\nradius = 0.004",
+        "kind = \"sphere\"\nat = [0, 0, 0]\nradius = 0.008",
+        "kind = \"box\"\nat = [0, 0, 0]\nhalf = [0.15, 0.005, 0.01]",
+    ];
+    let (mut ended, mut returned) = (0, 0);
+    for shape in shapes {
+        for _ in 0..6 {
+            let speed = 10.0_f64.powf(random.range(0.0, 3.5));
+            let (tilt, elements) = (random.range(-0.01, 0.01), 5 + (random.range(0.0, 6.0) as usize));
+            let deck = format!(
+                r#"
+[section.rod]
+EA = 1e5
+GA = 4e4
+GJ = 1
+EI = 1
+rhoA = 1
+rhoJ = [1e-5, 5e-6, 5e-6]
+
+[[beam]]
+name = "rod"
+section = "rod"
+through = [[0.001, -0.3, 0.1], [0.001, 0.31, {}]]
+elements = {elements}
+
+[[initial]]
+beam = "rod"
+velocity = [0, 0, -{speed}]
+
+[[surface]]
+name = "obstacle"
+{shape}
+
+[[contact]]
+name = "hit"
+beams = ["rod"]
+radius = 0.003
+surfaces = ["obstacle"]
+
+[[stage]]
+kind = "dynamic"
+end = {}
+step = {}
+
+[output]
+nodes = ["rod:{}"]
+columns = ["x", "v"]
+"#,
+                0.1 + tilt,
+                0.4 / speed,
+                4e-3 / speed,
+                elements / 2,
+            );
+            let simulation = attempt(&deck);
+            match &simulation.result {
+                Ok(()) => {
+                    let height = simulation.end(&format!("rod:{}.z", elements / 2));
+                    assert!(height > 0.0, "{shape}, {speed}: {height}\n{deck}");
+                    returned += 1;
+                }
+                Err(failure) => {
+                    let kinds = [FailureKind::ContactPassed, FailureKind::NotConverged];
+                    assert!(kinds.contains(&failure.kind()), "{failure}\n{deck}");
+                    ended += 1;
+                }
+            }
+        }
+    }
+    println!("{ended} ended, {returned} came back");
+    assert!(ended >= 10);
+}
+
+/// A surface stays where it is when a dynamic stage begins.
+#[test]
+fn surfaces_that_jump_into_a_dynamic_stage_are_refused() {
+    let deck = RUBBED_ROD
+        .replace("EI = 10", "EI = 10\nrhoA = 1\nrhoJ = [1e-2, 1e-2, 1e-2]")
+        .replace("ANGLE", "2")
+        .replace("kind = \"static\"\nsteps = STEPS", "kind = \"dynamic\"\nend = 0.1\nstep = 0.01");
+    let why = refusal(&deck);
+    assert!(why.contains("stage 2: the motion of surface \"drum\" must start at 0"), "{why}");
+    assert!(why.contains("give it a `history` that starts at the current value"), "{why}");
+    let first = deck.replace("stages = [2]", "").replace("[[stage]]\nkind = \"static\"\nsteps = 2\n", "");
+    assert!(refusal(&first).contains("stage 1: the motion of surface"), "{}", refusal(&first));
+}
+
 /// A level that fails for one stiffness of its contacts is cut back with the stiffness that it began with: wires of
 /// any number of elements come through the first curve.
 #[test]

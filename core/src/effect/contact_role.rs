@@ -26,7 +26,7 @@ pub trait Contacts {
     /// state.
     fn hold(&self, at: &mut State);
 
-    /// Begins the penalty of dynamic stages with the forces of the multipliers.
+    /// Begins the penalty of dynamic stages, after a static one, with the forces of the multipliers.
     fn begin_penalty(&self, at: &mut State);
 
     /// Writes the memory of a state that is accepted after `before`.
@@ -36,7 +36,8 @@ pub trait Contacts {
     fn change(&self, before: &State, at: &State) -> ContactChange;
 
     /// The deepest penetration of the contacts that act in a state, if it is larger than allowed.
-    fn penetrates(&self, at: &State) -> Option<Penetration>;
+    /// `begins` tells of which ones, by the number of the amplitude that switches them.
+    fn penetrates(&self, at: &State, begins: &dyn Fn(usize) -> bool) -> Option<Penetration>;
 
     /// The deepest penetration among all points of beams in a state, those included that carry no
     /// force, if it is larger than allowed.
@@ -52,6 +53,10 @@ pub trait Contacts {
     /// The part of an increment of the unknowns, up to 1, on which the centre lines of beams stay
     /// apart.
     fn safe_part(&self, at: &State, increment: &[Vec3]) -> f64;
+
+    /// Shows the surfaces with a prescribed motion: the name, the number of the amplitude, and whether
+    /// it is an angle.
+    fn driven_surfaces(&self, show: &mut dyn FnMut(&str, usize, bool));
 
     /// A surface that a prescribed rotation has turned too far for contact since amplitudes were `from`:
     /// its name, and radians.

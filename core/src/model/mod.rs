@@ -27,7 +27,7 @@ pub use names::Names;
 pub use parts::ModelParts;
 pub use schedule::{Schedule, TooFar};
 pub use section::{MassPerLength, SectionMatrices};
-pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError};
+pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError, SurfaceJump};
 
 use crate::effect::joint::nearest_angle;
 use crate::effect::{Constraint, Contacts, Effect, Energy, Momentum, MotorState};
@@ -205,6 +205,21 @@ impl Model {
                 jumps.push(MotorJump { slot, amplitude, turns, from, to });
             }
         });
+        jumps
+    }
+
+    /// The surfaces that a change of amplitudes moves at once.
+    pub fn surface_jumps(&self, amplitudes: &[f64], state: &State) -> Vec<SurfaceJump> {
+        let mut jumps = Vec::new();
+        if let Some(contacts) = self.contacts() {
+            contacts.driven_surfaces(&mut |surface, amplitude, turns| {
+                let [from, to] = [amplitudes, &state.amplitude].map(|amplitudes| amplitudes[amplitude]);
+                let size = if turns { 1.0 } else { self.length };
+                if (to - from).abs() > LARGEST_GAP * size {
+                    jumps.push(SurfaceJump { surface: surface.into(), amplitude, turns, from, to });
+                }
+            });
+        }
         jumps
     }
 

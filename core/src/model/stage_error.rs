@@ -17,6 +17,8 @@ pub enum StageError {
     TurnedHinge(Slot),
     /// A motor would have to jump.
     MotorJump(MotorJump),
+    /// A surface would have to jump.
+    SurfaceJump(SurfaceJump),
     /// A path or a search for critical loads, and nothing goes with the load factor.
     NothingGrows(StageKind),
     /// A search for modes, and nothing that is free to move has mass.
@@ -42,6 +44,21 @@ pub struct MotorJump {
     /// The number of its amplitude
     pub(crate) amplitude: usize,
     /// True where it turns, false where it slides
+    pub(crate) turns: bool,
+    /// The angle or displacement that it has reached
+    pub(crate) from: f64,
+    /// Where it begins
+    pub(crate) to: f64,
+}
+
+/// A surface that would have to jump when a dynamic stage begins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceJump {
+    /// Its name
+    pub(crate) surface: String,
+    /// The number of its amplitude
+    pub amplitude: usize,
+    /// True where it turns, false where it is displaced
     pub(crate) turns: bool,
     /// The angle or displacement that it has reached
     pub(crate) from: f64,

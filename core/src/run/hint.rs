@@ -41,7 +41,7 @@ impl Failure {
                 "end the stage before (`until`), make the beam longer, or stop the node by a spring".into(),
             ),
             Self::ContactPassed { .. } => {
-                Some("take more `steps`, or a smaller `step`; between beams, give the contact a larger `stiffness`".into())
+                Some("give the contact a larger `stiffness`, or take more `steps` or a smaller `step`".into())
             }
             Self::MeshTooCoarse { .. } => Some("use more `elements` there".into()),
             Self::EnergyGrowth { at, .. } => {

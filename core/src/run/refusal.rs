@@ -1,6 +1,6 @@
 //! Why stages cannot begin, in words.
 
-use crate::model::{Jump, Model, MotionKind, MotorJump, StageError, StageKind};
+use crate::model::{Jump, Model, MotionKind, MotorJump, StageError, StageKind, SurfaceJump};
 
 /// Why a stage cannot begin.
 pub fn refusal(error: &StageError, model: &Model) -> String {
@@ -30,6 +30,12 @@ pub fn refusal(error: &StageError, model: &Model) -> String {
         StageError::MotorJump(MotorJump { slot, turns, from, to, .. }) => {
             let (from, to) = (size(*from, *turns), size(*to, *turns));
             format!("the motor of the {} must start at {from}, where the joint is, but starts at {to}", node(*slot))
+        }
+        StageError::SurfaceJump(SurfaceJump { surface, turns, from, to, .. }) => {
+            let (from, to) = (size(*from, *turns), size(*to, *turns));
+            format!(
+                "the motion of surface \"{surface}\" must start at {from}, where the surface is, but starts at {to}"
+            )
         }
         StageError::NothingGrows(StageKind::Buckling) => {
             "a buckling stage needs a load or a motion that grows with the load factor".into()
@@ -64,10 +70,12 @@ pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<S
                 own_stages => Some(driven(own_stages)),
             }
         }
-        StageError::MotorJump(jump) => match model.amplitudes[jump.amplitude].has_own_stages() {
-            Some(_) if stage == 0 => Some(START.into()),
-            own_stages => Some(driven(own_stages)),
-        },
+        StageError::MotorJump(MotorJump { amplitude, .. }) | StageError::SurfaceJump(SurfaceJump { amplitude, .. }) => {
+            match model.amplitudes[*amplitude].has_own_stages() {
+                Some(_) if stage == 0 => Some(START.into()),
+                own_stages => Some(driven(own_stages)),
+            }
+        }
         StageError::TurnedHinge(_) => Some("fix all three, or fix them from the first stage on".into()),
         StageError::Conflict(_) | StageError::NothingGrows(_) | StageError::NoMass => None,
     }

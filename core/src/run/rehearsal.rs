@@ -188,6 +188,8 @@ impl<'p> Rehearser<'p> {
         }
         let motors = self.model.motor_jumps(&amplitude, &self.state);
         self.found.refusals.extend(motors.into_iter().map(|jump| (number, StageError::MotorJump(jump))));
+        let surfaces = self.model.surface_jumps(&amplitude, &self.state);
+        self.found.refusals.extend(surfaces.into_iter().map(|jump| (number, StageError::SurfaceJump(jump))));
         let given = begins.then_some(&given[..]);
         self.look_at_velocities(number, given);
         self.look_at_motors(number, begins);

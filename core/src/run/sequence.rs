@@ -127,8 +127,11 @@ impl<'o> Run<'o> {
         if let Some(contacts) = self.model.contacts() {
             let advances = stage.work.kind().advances_time();
             let regime = if advances { ContactRegime::Penalty } else { ContactRegime::Augmented };
-            if std::mem::replace(&mut state.contacts.regime, regime) != regime && advances {
-                contacts.begin_penalty(state);
+            if state.contacts.regime != regime {
+                match regime {
+                    ContactRegime::Penalty => contacts.begin_penalty(state),
+                    ContactRegime::Augmented => state.contacts.regime = regime,
+                }
             }
             if stage.work.kind() == StageKind::Modal {
                 contacts.hold(state);

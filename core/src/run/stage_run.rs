@@ -152,10 +152,12 @@ impl StageRun<'_> {
         Moment { stage: self.number + 1, time: self.state.time, load: self.state.load }
     }
 
-    /// Refuses a run that begins with a penetration.
+    /// Refuses contacts that begin to act in this stage with a penetration.
     pub fn refuse_penetration(&self) -> Result<(), Failure> {
-        let Some(contacts) = self.model.contacts().filter(|_| self.number == 0) else { return Ok(()) };
-        let Some(Penetration { contact, surface, slot, depth }) = contacts.penetrates(self.state) else {
+        let Some(contacts) = self.model.contacts() else { return Ok(()) };
+        let before = self.number.checked_sub(1);
+        let begins = |amplitude: usize| before.is_none_or(|before| !self.model.amplitudes[amplitude].acts_in(before));
+        let Some(Penetration { contact, surface, slot, depth }) = contacts.penetrates(self.state, &begins) else {
             return Ok(());
         };
         let node = self.model.node_at(slot as usize);

@@ -27,6 +27,9 @@ pub struct ContactMemory {
     /// Factors on the stiffness of stick with which load levels end, by the numbers of contacts; 1 for
     /// those that are not there
     pub(crate) full_stick_factors: Vec<f64>,
+    /// The energy by which penalties at the start of a dynamic stage exceed that of the static stage
+    /// before, whose forces they hold
+    pub(crate) taken_over: f64,
     /// The part of the stiffness of stick that acts at present in static stages
     pub(crate) stick_part: f64,
     /// True if the tangent has a stiffness against sliding and opening, which contacts have not
@@ -57,6 +60,7 @@ impl Default for ContactMemory {
             first_factor: 1.0,
             factor: 1.0,
             full_stick_factors: Vec::new(),
+            taken_over: 0.0,
             stick_part: 1.0,
             resists: false,
             goes_on: true,

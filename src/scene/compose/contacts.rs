@@ -1,6 +1,6 @@
 //! Contacts of beams and bodies with surfaces, and of beams with beams.
 
-use super::{Composer, stage_set};
+use super::{Composer, DrivenTable, MOTION_OF_A_SURFACE, stage_set};
 use crate::deck::{
     self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, SectionBody, Shape, Spanned, Stage,
     StageBody, SurfaceMotion,
@@ -134,11 +134,12 @@ impl Composer<'_> {
         let history = found.map_err(|diagnostic| self.diagnostics.push(diagnostic)).ok()?;
         self.out.amplitudes.push(Amplitude::of_motion(full, history, stage_set(table.stages.as_ref())));
         let number = self.out.amplitudes.len() - 1;
-        if let Some(history) = table.history.clone() {
-            let drives = Driven::Amplitude(number);
-            let (what, span) = ("motion of a surface", table.span.clone());
-            self.out.driven.push(super::DrivenTable { drives, what, span, history: Some(history) });
-        }
+        self.out.driven.push(DrivenTable {
+            drives: Driven::Amplitude(number),
+            what: MOTION_OF_A_SURFACE,
+            span: table.span.clone(),
+            history: table.history.clone(),
+        });
         Some(number)
     }
 

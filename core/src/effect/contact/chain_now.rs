@@ -123,15 +123,12 @@ impl<'a> ChainNow<'a> {
     fn law(&self, candidate: &Candidate, predecessors: &Predecessors, partner: Option<&PointMemory>) -> ContactLaw {
         let contacts = &self.at.contacts;
         let stiffness = self.chain.stiffness[candidate.element];
-        let multiplier = partner.map_or(0.0, |point| point.multiplier);
-        let normal = self.laws.normal_law(multiplier, &stiffness, contacts);
+        let normal = self.laws.normal_law(partner, &stiffness, contacts);
         let coefficient = self.laws.friction_at(self.chain.fraction(candidate));
         let friction = self.laws.friction(self.chain.contact, coefficient, &stiffness, contacts);
         let points = self.memory.map_or(&[][..], |memory| &memory.points);
         let carried = predecessors.traction(1.0, &|number| (&points[number], 1.0));
-        let is_penalty = contacts.regime == ContactRegime::Penalty;
-        let offset = partner.filter(|_| is_penalty).map_or(0.0, |point| point.offset);
-        ContactLaw { radius: self.chain.radius + offset, normal, friction, carried, place: candidate.place }
+        ContactLaw { radius: self.chain.radius, normal, friction, carried, place: candidate.place }
     }
 
     /// The memory of a point with a force. Before a state is accepted, traction and normal remain
@@ -143,7 +140,7 @@ impl<'a> ChainNow<'a> {
         let first = stiffness.first(self.at.contacts.regime);
         let carried = if accepts { self.laws.carried(law.friction.is_some(), first, state) } else { law.carried };
         let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
-        let gap = state.gap + law.radius - self.chain.radius;
+        let gap = state.gap;
         let force = state.normal_force.force;
         // The next level begins with the first stiffness.
         let next = stiffness.augmented * self.at.contacts.first_factor;
@@ -157,7 +154,7 @@ impl<'a> ChainNow<'a> {
             multiplier,
             gap,
             carried,
-            offset: before.map_or(0.0, |before| before.offset),
+            offset: law.normal.offset(),
             steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
             push: *rotation * state.force(),
             at: contact,

@@ -2,7 +2,7 @@
 
 use super::strand::ContactStiffness;
 use crate::kernel::contact::{CarriedTraction, FrictionLaw, NormalLaw, PointState, Status};
-use crate::system::{ContactMemory, ContactRegime};
+use crate::system::{ContactMemory, ContactRegime, PointMemory};
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
@@ -71,14 +71,15 @@ impl ContactLaws {
         })
     }
 
-    /// The law of normal forces in a state, at a point with this multiplier and stiffness. Where the
+    /// The law of normal forces in a state, at a point that was `partner` before. Where the
     /// tangent resists, a point that had a force has the tangent of a contact even if it opens.
     pub(super) fn normal_law(
         &self,
-        multiplier: f64,
+        partner: Option<&PointMemory>,
         stiffness: &ContactStiffness,
         contacts: &ContactMemory,
     ) -> NormalLaw {
+        let multiplier = partner.map_or(0.0, |point| point.multiplier);
         match contacts.regime {
             ContactRegime::Augmented => NormalLaw::Augmented {
                 multiplier,
@@ -90,7 +91,8 @@ impl ContactLaws {
                 },
             },
             ContactRegime::Penalty => {
-                NormalLaw::Penalty { stiffness: stiffness.penalty, damping: self.damping, toe: 0.0 }
+                let offset = partner.map_or(0.0, |point| point.offset);
+                NormalLaw::Penalty { stiffness: stiffness.penalty, damping: self.damping, offset }
             }
         }
     }

@@ -176,7 +176,7 @@ impl SurfaceContacts {
     }
 
     /// Changes the memory of all points with a force; shows them with the stiffness of their element.
-    fn change_points(&self, at: &mut State, change: impl Fn(&mut PointMemory, &ContactStiffness)) {
+    fn change_points(&self, at: &mut State, change: &mut dyn FnMut(&mut PointMemory, &ContactStiffness)) {
         let mut chains = (*at.contacts.chains).clone();
         for (chain, memory) in self.chains.iter().zip(&mut chains) {
             for point in &mut memory.points {
@@ -185,7 +185,7 @@ impl SurfaceContacts {
             }
         }
         at.contacts.chains = Arc::new(chains);
-        self.pairs().change_points(at, &change);
+        self.pairs().change_points(at, change);
     }
 
     /// Notes the deepest penetration and the shortest contact of a time step.
@@ -195,8 +195,7 @@ impl SurfaceContacts {
         self.each_chain(at, Weights::NONE, &mut |_, chain| {
             let mut stays = vec![false; chain.memory.map_or(0, |memory| memory.points.len())];
             chain.each_point(Weights::NONE, &mut |point, _| {
-                let offset = point.law.radius - chain.chain.radius;
-                deepest = deepest.max(-(point.state.gap + offset) / chain.laws.penetration);
+                deepest = deepest.max(-point.state.gap / chain.laws.penetration);
                 if point.state.normal_force.force > 0.0 {
                     point.predecessors.all().for_each(|number| stays[number] = true);
                 }
@@ -209,6 +208,27 @@ impl SurfaceContacts {
         contacts.deepest = contacts.deepest.max(deepest);
         contacts.shortest = contacts.shortest.into_iter().chain(shortest).min();
         self.pairs().judge_penalty(at);
+    }
+
+    /// A node at a point that is so deep in a surface after a time step that it may come out on another
+    /// side, nearer to the middle of the surface than to its face, or that has come to another side.
+    fn sunk(&self, at: &State) -> Option<Slot> {
+        let mut sunk = None;
+        if at.contacts.regime == ContactRegime::Penalty {
+            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+                let deepest = -0.5 * chain.surface.depth();
+                if deepest == f64::NEG_INFINITY {
+                    return;
+                }
+                chain.each_point(Weights::NONE, &mut |point, _| {
+                    let before = point.partner.map_or(Vec3::ZERO, |before| before.carried.normal);
+                    if point.state.gap + chain.chain.radius < deepest || before.dot(point.state.normal) < 0.0 {
+                        sunk = Some(chain.slot_of(point.candidate));
+                    }
+                });
+            });
+        }
+        sunk
     }
 
     /// A node at a point with friction whose normal has turned over since the last converged state.
@@ -411,7 +431,7 @@ impl Contacts for SurfaceContacts {
     fn hold(&self, at: &mut State) {
         at.contacts.regime = ContactRegime::Augmented;
         at.contacts.factor = HELD;
-        self.change_points(at, |point, stiffness| {
+        self.change_points(at, &mut |point, stiffness| {
             point.multiplier = point.force + stiffness.augmented * HELD * point.gap
         });
     }
@@ -419,10 +439,15 @@ impl Contacts for SurfaceContacts {
     fn begin_penalty(&self, at: &mut State) {
         at.contacts.deepest = 0.0;
         at.contacts.shortest = None;
-        self.change_points(at, |point, stiffness| {
+        at.contacts.regime = ContactRegime::Augmented;
+        let before = Contacts::energy(self, at);
+        at.contacts.regime = ContactRegime::Penalty;
+        self.pairs().begin_penalty(at);
+        self.change_points(at, &mut |point, stiffness| {
             point.offset = point.force / stiffness.penalty + point.gap;
             point.steps = 0;
         });
+        at.contacts.taken_over = Contacts::energy(self, at) - before;
     }
 
     fn accept(&self, before: &State, at: &mut State) {
@@ -477,9 +502,12 @@ impl Contacts for SurfaceContacts {
         }
     }
 
-    fn penetrates(&self, at: &State) -> Option<Penetration> {
+    fn penetrates(&self, at: &State, begins: &dyn Fn(usize) -> bool) -> Option<Penetration> {
         let mut deepest: Option<Penetration> = None;
         self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            if !begins(chain.laws.amplitude) {
+                return;
+            }
             chain.each_point(Weights::NONE, &mut |point, _| {
                 let depth = -point.state.gap;
                 let is_deepest = deepest.as_ref().is_none_or(|deepest| depth > deepest.depth);
@@ -493,7 +521,7 @@ impl Contacts for SurfaceContacts {
                 }
             });
         });
-        for (chain, laws, surface) in self.acting(at) {
+        for (chain, laws, surface) in self.acting(at).filter(|(_, laws, _)| begins(laws.amplitude)) {
             let carrier = surface.carrier(at, Weights::NONE);
             let Some((node, depth)) = chain.lost_node(&surface.surface, &carrier, at, laws.penetration) else {
                 continue;
@@ -503,7 +531,7 @@ impl Contacts for SurfaceContacts {
                 deepest = Some(Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth });
             }
         }
-        deeper(deepest, self.pairs().penetrates(at))
+        deeper(deepest, self.pairs().penetrates(at, begins))
     }
 
     fn hidden_penetration(&self, at: &State) -> Option<Penetration> {
@@ -517,6 +545,16 @@ impl Contacts for SurfaceContacts {
             }
         }
         deeper(deepest, self.pairs().hidden_penetration(at))
+    }
+
+    fn driven_surfaces(&self, show: &mut dyn FnMut(&str, usize, bool)) {
+        for SceneSurface { name, carrier, .. } in &self.surfaces {
+            match *carrier {
+                SurfaceCarrier::Ground | SurfaceCarrier::Node { .. } => {}
+                SurfaceCarrier::Shift { amplitude, .. } => show(name, amplitude, false),
+                SurfaceCarrier::Turn { amplitude, .. } => show(name, amplitude, true),
+            }
+        }
     }
 
     fn turned(&self, from: &[f64], at: &State) -> Option<(&str, f64)> {
@@ -538,7 +576,8 @@ impl Contacts for SurfaceContacts {
         let of_chain = |(chain, _, surface): (&Chain, &ContactLaws, &SceneSurface)| {
             passing::passed(chain, surface, from, to).map(|node| chain.nodes[node].node.u)
         };
-        self.acting(to).find_map(of_chain).or_else(|| self.turned_over(to)).or_else(|| self.pairs().passed(from, to))
+        let of_surfaces = self.acting(to).find_map(of_chain).or_else(|| self.sunk(to));
+        of_surfaces.or_else(|| self.turned_over(to)).or_else(|| self.pairs().passed(from, to))
     }
 
     fn energy(&self, at: &State) -> f64 {

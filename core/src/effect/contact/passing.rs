@@ -1,4 +1,4 @@
-//! Nodes that pass through a surface, or out of it on another side, within one step.
+//! Beams and bodies that pass through a surface, or out of it on another side, within one step.
 
 use super::chain::Chain;
 use super::surface::SceneSurface;
@@ -10,32 +10,70 @@ use crate::tensor::Vec3;
 /// The shortest step on a way that is looked at, over the radius of the sphere that goes it.
 const SHORTEST_LOOK: f64 = 0.1;
 
-/// The number of a node of a chain that may have passed through a surface on the way from one state to
-/// another.
+/// Places of an element whose ways are looked at, at most, beside its nodes.
+const MOST_PLACES: f64 = 32.0;
+
+/// The number of a node of a chain at which the beam or body may have passed through a surface on the way
+/// from one state to another.
 pub(super) fn passed(chain: &Chain, surface: &SceneSurface, from: &State, to: &State) -> Option<usize> {
     let depth = surface.depth();
     if depth == f64::INFINITY {
         return None;
     }
-    let [before, after] = [from, to].map(|at| with_middles(chain.seen(&surface.carrier(at, Weights::NONE), at)));
-    let passes = |(before, after): (&Vec3, &Vec3)| {
-        let moved = (*after - *before).norm();
-        if moved <= chain.radius.min(depth) {
+    let [before, after] = [from, to].map(|at| chain.seen(&surface.carrier(at, Weights::NONE), at));
+    let way = Way { surface: &surface.surface, radius: chain.radius, depth };
+    let node = before.iter().zip(&after).position(|(before, after)| way.passes(*before, *after));
+    node.or_else(|| {
+        let ends = before.windows(2).zip(after.windows(2));
+        ends.map(|(before, after)| way.chord_passes([before[0], before[1]], [after[0], after[1]])).position(|it| it)
+    })
+}
+
+/// The way of a sphere to or through a surface.
+struct Way<'a> {
+    surface: &'a Surface,
+    /// Of the sphere
+    radius: f64,
+    /// The depth from which a point still finds its way out of the surface
+    depth: f64,
+}
+
+impl Way<'_> {
+    /// True if a sphere that goes the straight way between two places may have passed.
+    fn passes(&self, before: Vec3, after: Vec3) -> bool {
+        let moved = (after - before).norm();
+        if moved <= self.radius.min(self.depth) {
             return false;
         }
-        if goes_deeper(&surface.surface, *before, *after, chain.radius) {
+        if goes_deeper(self.surface, before, after, self.radius) {
             return true;
         }
-        if moved <= depth {
+        if moved <= self.depth {
             return false;
         }
-        let [from, to] = [before, after].map(|place| surface.surface.distance(*place).ok());
-        let reach = from.map_or(0.0, |from| from.value + depth);
+        let [from, to] = [before, after].map(|place| self.surface.distance(place).ok());
+        let reach = from.map_or(0.0, |from| from.value + self.depth);
         // Along a surface nodes may go farther; on its other side the normal is turned over.
         let has_turned = from.zip(to).is_none_or(|(from, to)| from.normal.dot(to.normal) < 0.0);
         moved > reach && has_turned
-    };
-    before.iter().zip(&after).position(passes).map(|number| number % chain.nodes.len())
+    }
+
+    /// The same for places between the ends of an element, so near to each other that the surface does not
+    /// fit between them.
+    fn chord_passes(&self, before: [Vec3; 2], after: [Vec3; 2]) -> bool {
+        let moved = (after[0] - before[0]).norm().max((after[1] - before[1]).norm());
+        if moved <= self.radius.min(self.depth) {
+            return false;
+        }
+        let between = |ends: [Vec3; 2], at: f64| ends[0] + (ends[1] - ends[0]) * at;
+        let length = (before[1] - before[0]).norm().max((after[1] - after[0]).norm());
+        let reach = 0.5 * length + moved + self.radius;
+        if self.surface.distance(between(before, 0.5)).is_ok_and(|distance| distance.value > reach) {
+            return false;
+        }
+        let places = (length / (self.radius + self.depth)).ceil().clamp(2.0, MOST_PLACES) as usize;
+        (1..places).map(|k| k as f64 / places as f64).any(|at| self.passes(between(before, at), between(after, at)))
+    }
 }
 
 /// True if a sphere that goes the straight way between two places, in the axes of a surface, is
@@ -56,11 +94,4 @@ fn goes_deeper(surface: &Surface, from: Vec3, to: Vec3, radius: f64) -> bool {
         done += (here.value - least).max(SHORTEST_LOOK * radius);
     }
     false
-}
-
-/// Places, followed by the middles between each two neighbours.
-fn with_middles(mut places: Vec<Vec3>) -> Vec<Vec3> {
-    let middles: Vec<Vec3> = places.windows(2).map(|pair| (pair[0] + pair[1]) * 0.5).collect();
-    places.extend(middles);
-    places
 }

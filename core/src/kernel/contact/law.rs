@@ -3,12 +3,12 @@
 //!
 //! ```text
 //! statics    p = max(0, L - K g)                           augmented Lagrangian
-//! dynamics   p = K d(g) max(0, 1 - c dg/dt),  d = max(0, -g)   penalty with damping
+//! dynamics   p = K max(0, g0 - g) max(0, 1 - c dg/dt)   penalty with damping
 //! ```
 //!
-//! With a toe of length e the depth d is (e-g)^2/(4e) for |g| < e, so that the stiffness is
-//! continuous. With damping, a body that hits at speed v rebounds at e v, where z = c v and z (1+e)
-//! = ln((1+z)/(1-e z)): [`restitution`]. It depends neither on K nor on the toe.
+//! The force begins at the gap g0, which is zero unless a static stage has left a force. With damping,
+//! a body that hits at speed v rebounds at e v, where z = c v and z (1+e) = ln((1+z)/(1-e z)):
+//! [`restitution`]. It does not depend on K.
 
 use crate::scalar::Real;
 
@@ -31,8 +31,8 @@ pub enum NormalLaw {
         stiffness: f64,
         /// c, time per length
         damping: f64,
-        /// e, the gap at which the force begins; zero for none
-        toe: f64,
+        /// g0, the gap at which the force begins
+        offset: f64,
     },
 }
 
@@ -58,13 +58,6 @@ impl<T: Real> NormalForce<T> {
     }
 }
 
-/// The depth of a penetration, rounded by a toe, with its derivative over the gap.
-#[derive(Clone, Copy)]
-struct Depth<T> {
-    value: T,
-    over_gap: T,
-}
-
 impl NormalLaw {
     /// The force of a gap that changes at `rate`.
     pub fn force<T: Real>(&self, gap: T, rate: T) -> NormalForce<T> {
@@ -77,16 +70,16 @@ impl NormalLaw {
                 let force = if force.largest() > 0.0 { force } else { T::zero() };
                 NormalForce { force, over_gap: T::constant(-stiffness), over_rate: T::zero() }
             }
-            Self::Penalty { stiffness, damping, toe } => {
+            Self::Penalty { stiffness, damping, offset } => {
                 let factor = T::one() - rate * damping;
-                let depth = depth(gap, toe);
-                if depth.value.largest() <= 0.0 || factor.largest() <= 0.0 {
+                let depth = T::constant(offset) - gap;
+                if depth.largest() <= 0.0 || factor.largest() <= 0.0 {
                     return NormalForce::none();
                 }
                 NormalForce {
-                    force: depth.value * factor * stiffness,
-                    over_gap: depth.over_gap * factor * stiffness,
-                    over_rate: depth.value * (-stiffness * damping),
+                    force: depth * factor * stiffness,
+                    over_gap: -factor * stiffness,
+                    over_rate: depth * (-stiffness * damping),
                 }
             }
         }
@@ -103,25 +96,16 @@ impl NormalLaw {
     pub fn energy(&self, gap: f64) -> f64 {
         match *self {
             Self::Augmented { .. } => 0.0,
-            Self::Penalty { stiffness, toe, .. } if gap.abs() < toe => {
-                let inside = toe - gap;
-                stiffness * inside * inside * inside / (12.0 * toe)
-            }
-            Self::Penalty { stiffness, toe, .. } if gap < 0.0 => stiffness * (0.5 * gap * gap + toe * toe / 6.0),
-            Self::Penalty { .. } => 0.0,
+            Self::Penalty { stiffness, offset, .. } => 0.5 * stiffness * (offset - gap).max(0.0).powi(2),
         }
     }
-}
 
-fn depth<T: Real>(gap: T, toe: f64) -> Depth<T> {
-    let g = gap.largest();
-    if g >= toe {
-        Depth { value: T::zero(), over_gap: T::zero() }
-    } else if g > -toe {
-        let inside = T::constant(toe) - gap;
-        Depth { value: inside * inside * (0.25 / toe), over_gap: inside * (-0.5 / toe) }
-    } else {
-        Depth { value: -gap, over_gap: T::constant(-1.0) }
+    /// The gap at which the force begins.
+    pub fn offset(&self) -> f64 {
+        match *self {
+            Self::Augmented { .. } => 0.0,
+            Self::Penalty { offset, .. } => offset,
+        }
     }
 }
 
@@ -178,9 +162,9 @@ mod tests {
 
     const LAWS: [NormalLaw; 4] = [
         NormalLaw::Augmented { multiplier: 3.0, stiffness: 50.0, touching: 0.0 },
-        NormalLaw::Penalty { stiffness: 70.0, damping: 0.0, toe: 0.0 },
-        NormalLaw::Penalty { stiffness: 70.0, damping: 1.5, toe: 0.0 },
-        NormalLaw::Penalty { stiffness: 70.0, damping: 0.8, toe: 0.03 },
+        NormalLaw::Penalty { stiffness: 70.0, damping: 0.0, offset: 0.0 },
+        NormalLaw::Penalty { stiffness: 70.0, damping: 1.5, offset: 0.0 },
+        NormalLaw::Penalty { stiffness: 70.0, damping: 0.8, offset: 0.03 },
     ];
 
     #[test]
@@ -202,13 +186,13 @@ mod tests {
 
     #[test]
     fn the_undamped_force_is_the_slope_of_the_energy() {
-        let law = |toe| NormalLaw::Penalty { stiffness: 70.0, damping: 0.0, toe };
-        for toe in [0.0, 0.03] {
+        let law = |offset| NormalLaw::Penalty { stiffness: 70.0, damping: 0.0, offset };
+        for offset in [0.0, 0.03] {
             for k in -100..100 {
                 let gap = f64::from(k) * 1e-3 + 3e-4;
                 let h = 1e-6;
-                let slope = (law(toe).energy(gap + h) - law(toe).energy(gap - h)) / (2.0 * h);
-                assert!((slope + law(toe).force(gap, 0.0).force).abs() < 1e-6, "{toe} {gap}");
+                let slope = (law(offset).energy(gap + h) - law(offset).energy(gap - h)) / (2.0 * h);
+                assert!((slope + law(offset).force(gap, 0.0).force).abs() < 1e-6, "{offset} {gap}");
             }
         }
     }
@@ -242,7 +226,7 @@ mod tests {
             for speed in [0.2, 3.0] {
                 let damping = damping_of(wanted, speed).unwrap();
                 assert!((restitution(damping, speed) - wanted).abs() < 1e-9, "{wanted} {speed}");
-                let law = NormalLaw::Penalty { stiffness: 100.0, damping, toe: 0.0 };
+                let law = NormalLaw::Penalty { stiffness: 100.0, damping, offset: 0.0 };
                 let found = rebound(law, speed);
                 assert!((found - wanted).abs() < 1e-5, "{wanted} {speed} {found}");
             }

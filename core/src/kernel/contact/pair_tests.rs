@@ -178,7 +178,7 @@ fn random_pair<const NA: usize, const NB: usize>(
     scene.law.radii = [(distance + depth) * split, (distance + depth) * (1.0 - split)];
     let stiffness = random.between(1.0, 5.0);
     scene.law.normal = if damped {
-        NormalLaw::Penalty { stiffness, damping: random.between(0.1, 0.5), toe: 0.0 }
+        NormalLaw::Penalty { stiffness, damping: random.between(0.1, 0.5), offset: 0.0 }
     } else {
         NormalLaw::Augmented { multiplier: random.between(0.1, 1.0), stiffness, touching: 0.0 }
     };
@@ -365,7 +365,7 @@ fn rods_that_roll_on_each_other_do_not_slide() {
         e: 0.5,
         law: PairLaw {
             radii: [1.0, 2.0],
-            normal: NormalLaw::Penalty { stiffness: 100.0, damping: 0.0, toe: 0.0 },
+            normal: NormalLaw::Penalty { stiffness: 100.0, damping: 0.0, offset: 0.0 },
             friction: Some(FrictionLaw { coefficient: 0.5, stiffness: 10.0, resistance: 0.0, goes_on: false }),
             carried: CarriedTraction::default(),
             carrier: 0,

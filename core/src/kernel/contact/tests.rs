@@ -269,7 +269,7 @@ fn random_scene<const N: usize>(random: &mut Random, surface: &Surface, kind: Ki
     let depth = random.between(0.1, 0.4);
     scene.law.radius = here.value + depth;
     scene.law.normal = if kind.damped {
-        NormalLaw::Penalty { stiffness, damping: random.between(0.1, 0.5), toe: random.between(0.0, 0.3) }
+        NormalLaw::Penalty { stiffness, damping: random.between(0.1, 0.5), offset: random.between(0.0, 0.3) }
     } else {
         NormalLaw::Augmented { multiplier: random.between(0.1, 1.0), stiffness, touching: 0.0 }
     };
@@ -548,7 +548,7 @@ fn balls_that_roll_do_not_slide() {
         surface: surface.clone(),
         law: ContactLaw {
             radius,
-            normal: NormalLaw::Penalty { stiffness: 100.0, damping: 0.0, toe: 0.0 },
+            normal: NormalLaw::Penalty { stiffness: 100.0, damping: 0.0, offset: 0.0 },
             friction: Some(FrictionLaw { coefficient: 0.5, stiffness: 10.0, resistance: 0.0, goes_on: false }),
             carried: CarriedTraction::default(),
             place: Place::Fixed,

@@ -24,6 +24,8 @@ const STANDING_STILL: f64 = 1e-6;
 const PROPOSED_ERROR: f64 = 0.4;
 /// The least part of a step that is proposed where another scheme does with the step as it is.
 const LEAST_PART_OF_STEP: f64 = 0.1;
+/// The part of an imbalance from which on one reason explains most of it.
+const OWN_PART: f64 = 0.5;
 /// Steps that a contact should last: with ten the rebound is within 0.4 %.
 const LEAST_STEPS_OF_CONTACT: u32 = 9;
 
@@ -39,9 +41,16 @@ impl Dynamics<'_, '_> {
         let stage = self.stage.number + 1;
         let percent = 100.0 * share.abs();
         if !is_own {
+            let off = share.abs() * self.stage.bookkeeper.scale();
+            let why = if self.stage.state.contacts.taken_over > OWN_PART * off {
+                "contacts hold the forces of the static stage before by springs, whose energy is new: parts that lift \
+                 off take it along (give the contact a larger `stiffness`)"
+            } else {
+                "the work of earlier stages is integrated by the trapezoidal rule between load levels (use more \
+                 `steps` there)"
+            };
             let message = format!(
-                "stage {stage}: energy.total is off by {percent:.0} % of the largest energy, mostly because the work \
-                 of earlier stages is integrated by the trapezoidal rule between load levels (use more `steps` there)"
+                "stage {stage}: energy.total is off by {percent:.0} % of the largest energy, mostly because {why}"
             );
             self.stage.warn(WarningKind::EnergyBalance, message);
         } else if share < 0.0 {

@@ -58,14 +58,18 @@ impl Dynamics<'_, '_> {
         begins
     }
 
-    /// Sets the clock, and all accelerations but prescribed ones to zero; motors must not jump.
+    /// Sets the clock, and all accelerations but prescribed ones to zero; motors and surfaces must not
+    /// jump.
     pub(super) fn set_clock(&mut self) -> Result<(), Failure> {
         let StageRun { model, state, schedule, .. } = &mut *self.stage;
         state.a.fill(Vec3::ZERO);
         let (time, amplitude) = (state.time, state.amplitude.clone());
         schedule.set_clock(model, state, time, 1.0);
-        match model.motor_jumps(&amplitude, state).into_iter().next() {
-            Some(jump) => Err(self.stage.describe(StageError::MotorJump(jump))),
+        let motor = model.motor_jumps(&amplitude, state).into_iter().next().map(StageError::MotorJump);
+        let jump =
+            motor.or_else(|| model.surface_jumps(&amplitude, state).into_iter().next().map(StageError::SurfaceJump));
+        match jump {
+            Some(jump) => Err(self.stage.describe(jump)),
             None => Ok(()),
         }
     }

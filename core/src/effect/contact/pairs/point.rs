@@ -15,6 +15,10 @@ use crate::system::{ContactRegime, ListedPair, PairPointKind, PairPointMemory, P
 use crate::tensor::{Mat3, Vec3};
 use std::borrow::Cow;
 
+/// Points of two elements are at one place if their places along both beams differ by less than this, in
+/// elements: those at a common node of two elements.
+const AT_ONE_PLACE: f64 = 1e-3;
+
 /// A contact point of two beams in a state.
 pub(super) struct PairPoint<'a> {
     /// Number of the pair in the list
@@ -164,6 +168,61 @@ impl<'a> PairsNow<'a> {
         }
     }
 
+    /// The points that hold by penalties what multipliers held. A static stage gives each point its own
+    /// force; in a dynamic one points share a force by weights. Each candidate takes the forces of the
+    /// point in memory that it was and of those at its place, divided by the weights of all that do.
+    pub fn holding_points(&self) -> Vec<PairPointMemory> {
+        let mut out = Vec::new();
+        let mut first = 0;
+        for group in self.list.chunk_by(|a, b| a.meeting == b.meeting) {
+            self.hold_meeting(first, group, &mut out);
+            first += group.len();
+        }
+        sort(&mut out);
+        out
+    }
+
+    fn hold_meeting(&self, first: usize, group: &[ListedPair], out: &mut Vec<PairPointMemory>) {
+        let (_, known) = self.memory_of_meeting(group[0].meeting);
+        if known.is_empty() {
+            return;
+        }
+        let laws = &self.laws[self.pairs.contact_of(group[0].meeting as usize)];
+        let mut found = Vec::new();
+        for (number, pair) in (first..).zip(group) {
+            if self.pairs.chord_gap(pair, &self.places) <= laws.penetration {
+                let candidates = self.sharing_candidates(pair, laws.penetration);
+                found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
+            }
+        }
+        let was = self.predecessors(&found, known, laws);
+        let held_by = |(Found { number, candidate }, was): (&Found, &Predecessors)| -> Vec<Link> {
+            let links = self.links(&self.list[*number], candidate, known).into_iter();
+            links.filter(|link| link.shift < AT_ONE_PLACE || was.own == Some(link.point)).collect()
+        };
+        let held: Vec<Vec<Link>> = found.iter().zip(&was).map(held_by).collect();
+        let mut weights = vec![0.0; known.len()];
+        for (Found { candidate, .. }, links) in found.iter().zip(&held) {
+            links.iter().for_each(|link| weights[link.point] += candidate.weight);
+        }
+        for (Found { number, candidate }, links) in found.iter().zip(&held) {
+            let Some(nearest) = links.iter().min_by(|a, b| a.shift.total_cmp(&b.shift)) else { continue };
+            let nearest = &known[nearest.point];
+            let (mut force, mut traction) = (0.0, Vec3::ZERO);
+            for link in links {
+                let part = known[link.point].weight / weights[link.point];
+                force += known[link.point].point.force * part;
+                traction += known[link.point].point.carried.force * part;
+            }
+            let elements = self.list[*number].elements;
+            let [place, on_second] = [0, 1].map(|side| f64::from(elements[side]) + candidate.at[side]);
+            let carried = CarriedTraction { force: traction, ..nearest.point.carried };
+            let point = PointMemory { place, force, carried, ..nearest.point };
+            out.push(PairPointMemory { kind: candidate.kind, on_second, weight: candidate.weight, point, ..*nearest });
+        }
+        out.extend(known.iter().zip(&weights).filter(|(_, weight)| **weight == 0.0).map(|(point, _)| *point));
+    }
+
     /// The points of a meeting that had a force, and the number of the first of them.
     fn memory_of_meeting(&self, meeting: u32) -> (usize, &'a [PairPointMemory]) {
         let points = &self.at.contacts.pairs.points;
@@ -278,17 +337,14 @@ impl<'a> PairsNow<'a> {
         let Part { pair, candidate, partner, .. } = part;
         let contacts = &self.at.contacts;
         let stiffness = self.stiffness(pair);
-        let multiplier = partner.map_or(0.0, |known| known.point.multiplier);
-        let normal = laws.normal_law(multiplier, &stiffness, contacts);
+        let normal = laws.normal_law(partner.map(|known| &known.point), &stiffness, contacts);
         let [a, b] = self.pairs.both(pair.meeting as usize);
-        let is_penalty = contacts.regime == ContactRegime::Penalty;
-        let offset = partner.filter(|_| is_penalty).map_or(0.0, |known| known.point.offset);
         let friction = self.friction(pair, candidate, laws);
         let carrier = if friction.is_some() { self.carrier(pair, *partner) } else { 0 };
         let carried =
             if friction.is_some() { self.on_carrier(pair, carrier, part.carried) } else { CarriedTraction::default() };
         PairLaw {
-            radii: [a.radius + offset, b.radius],
+            radii: [a.radius, b.radius],
             normal,
             friction,
             carried,
@@ -353,8 +409,7 @@ impl<'a> PairsNow<'a> {
         let PairPoint { pair, candidate, state, law, .. } = point;
         let [a, _] = self.pairs.both(pair.meeting as usize);
         let contacts = &self.at.contacts;
-        let offset = law.radii[0] - a.radius;
-        let gap = state.gap + offset;
+        let gap = state.gap;
         let force = state.normal_force.force;
         let normal = point.normal();
         // Stages go on with the first stiffness.
@@ -380,7 +435,7 @@ impl<'a> PairsNow<'a> {
                 multiplier: if accepts { force + first * gap } else { force },
                 gap,
                 carried,
-                offset: before.map_or(0.0, |before| before.offset),
+                offset: law.normal.offset(),
                 steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
                 push: (normal * force + point.traction()) * candidate.weight,
                 at: point.place - normal * (a.radius + 0.5 * gap),
@@ -421,4 +476,13 @@ fn is_near(kind: PairPointKind, shifts: [f64; 2]) -> bool {
         PairPointKind::NodeOfSecond => shifts[1] == 0.0,
     };
     is_same_node && shifts.iter().all(|&shift| shift <= LARGEST_SHIFT)
+}
+
+/// The order of points in memory.
+pub(super) fn sort(points: &mut [PairPointMemory]) {
+    let places = |point: &PairPointMemory| [point.point.place, point.on_second];
+    points.sort_by(|a, b| {
+        let [[a0, a1], [b0, b1]] = [places(a), places(b)];
+        a.meeting.cmp(&b.meeting).then(a0.total_cmp(&b0)).then(a1.total_cmp(&b1))
+    });
 }

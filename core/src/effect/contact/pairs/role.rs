@@ -1,7 +1,7 @@
 //! The role of contacts for pairs of beams.
 
 use super::BeamPairs;
-use super::point::{PairPoint, PairsNow};
+use super::point::{PairPoint, PairsNow, sort};
 use crate::effect::contact::laws::{ContactLaws, RELEVANT_FORCE, ROUNDED};
 use crate::effect::contact::strand::ContactStiffness;
 use crate::effect::{ContactChange, ContactResultant, ContactSurvey, Penetration};
@@ -81,15 +81,7 @@ impl<'a> PairRole<'a> {
         });
         let open = known.iter().zip(&goes_on).filter(|(_, goes_on)| !**goes_on);
         points.extend(open.filter_map(|(known, _)| Some(PairPointMemory { point: known.point.opened()?, ..*known })));
-        let order = |a: &PairPointMemory, b: &PairPointMemory| {
-            let places = |point: &PairPointMemory| [point.point.place, point.on_second];
-            let [a_places, b_places] = [places(a), places(b)];
-            a.meeting
-                .cmp(&b.meeting)
-                .then(a_places[0].total_cmp(&b_places[0]))
-                .then(a_places[1].total_cmp(&b_places[1]))
-        };
-        points.sort_by(order);
+        sort(&mut points);
         at.contacts.pairs.points = Arc::new(points);
         if accepts && self.rubs() {
             at.contacts.pairs.nodes = Arc::new(self.pairs.poses(at));
@@ -103,8 +95,14 @@ impl<'a> PairRole<'a> {
         at.contacts.pairs = memory;
     }
 
+    /// Lets points share what multipliers held.
+    pub fn begin_penalty(self, at: &mut State) {
+        let points = self.now(at).holding_points();
+        at.contacts.pairs.points = Arc::new(points);
+    }
+
     /// Changes the memory of all points; shows them with the stiffness of their pair.
-    pub fn change_points(self, at: &mut State, change: &impl Fn(&mut PointMemory, &ContactStiffness)) {
+    pub fn change_points(self, at: &mut State, change: &mut dyn FnMut(&mut PointMemory, &ContactStiffness)) {
         let mut points = (*at.contacts.pairs.points).clone();
         let now = self.now(at);
         for point in &mut points {
@@ -154,12 +152,13 @@ impl<'a> PairRole<'a> {
         }
     }
 
-    /// The deepest penetration among all listed pairs that act, if it is larger than `allowed` times
-    /// that of the deck.
-    fn deepest(self, at: &State, allowed: f64) -> Option<(ListedPair, f64)> {
+    /// The deepest penetration among listed pairs that act, if it is larger than `allowed` times that of
+    /// the deck; `begins`: see [`Contacts::penetrates`](crate::effect::Contacts::penetrates).
+    fn deepest(self, at: &State, allowed: f64, begins: &dyn Fn(usize) -> bool) -> Option<(ListedPair, f64)> {
         let now = self.now(at);
         let mut deepest: Option<(ListedPair, f64)> = None;
-        for pair in now.list.iter().filter(|pair| self.acts(pair, at)) {
+        let looks = |pair: &&ListedPair| self.acts(pair, at) && begins(self.law_of(pair.meeting).amplitude);
+        for pair in now.list.iter().filter(looks) {
             let depth = -now.gap(pair);
             let is_deepest = deepest.is_none_or(|(_, deepest)| depth > deepest);
             if depth > allowed * self.law_of(pair.meeting).penetration && is_deepest {
@@ -181,13 +180,13 @@ impl<'a> PairRole<'a> {
     }
 
     /// The deepest penetration, if it is larger than allowed.
-    pub fn penetrates(self, at: &State) -> Option<Penetration> {
-        self.deepest(at, 1.0).map(|found| self.penetration_of(found))
+    pub fn penetrates(self, at: &State, begins: &dyn Fn(usize) -> bool) -> Option<Penetration> {
+        self.deepest(at, 1.0, begins).map(|found| self.penetration_of(found))
     }
 
     /// The deepest penetration, if it exceeds the allowed one by more than augmentations leave.
     pub fn hidden_penetration(self, at: &State) -> Option<Penetration> {
-        self.deepest(at, ROUNDED).map(|found| self.penetration_of(found))
+        self.deepest(at, ROUNDED, &|_| true).map(|found| self.penetration_of(found))
     }
 
     /// A node of a pair whose centre lines may have crossed on the way.
@@ -246,8 +245,7 @@ impl<'a> PairRole<'a> {
         let mut stays = vec![false; known.len()];
         let mut deepest = 0.0f64;
         self.each(at, &mut |point| {
-            let offset = point.law.radii[0] - self.pairs.both(point.pair.meeting as usize)[0].radius;
-            deepest = deepest.max(-(point.state.gap + offset) / self.law_of(point.pair.meeting).penetration);
+            deepest = deepest.max(-point.state.gap / self.law_of(point.pair.meeting).penetration);
             if point.state.normal_force.force > 0.0 {
                 point.successions().for_each(|number| stays[number] = true);
             }
