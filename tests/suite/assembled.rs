@@ -140,6 +140,7 @@ radius = 0.3
 rotate = [0, 1, 0]
 about = [0, 0, 0]
 angle = 0.4
+history = "turn"
 [[contact]]
 name = "rough"
 beams = ["a", "b"]
@@ -149,6 +150,8 @@ radius = { a = 0.1, b = 0.15, tip = 0.2 }
 stiffness = 5
 friction = 0.3
 damping = 0.1
+[history.turn]
+expr = "2*t"
 "#;
 
 fn tangent_holds(text: &str, incremental: bool, seed: u64) {

@@ -818,3 +818,61 @@ columns = ["u"]
     assert_eq!(failure.kind(), FailureKind::ContactStart, "{failure}");
     assert!(failure.to_string().contains("stage 2"), "{failure}");
 }
+
+/// Equal rods side by side, node against node, swap their velocities: all nodes touch at once, at kinks that
+/// are no more than round-off.
+#[test]
+fn rods_that_hit_flush_rebound() {
+    for (elements, shift) in [(4, 0.0), (10, 0.0), (11, 0.0), (10, 0.1)] {
+        let deck = format!(
+            r#"
+[section.s]
+EA = 1e6
+GA = 4e5
+GJ = 500
+EI = 500
+rhoA = 0.5
+rhoJ = [1e-4, 5e-5, 5e-5]
+
+[[beam]]
+name = "a"
+section = "s"
+through = [[-0.5, 0, 0], [0.5, 0, 0]]
+elements = {elements}
+
+[[beam]]
+name = "b"
+section = "s"
+through = [[{}, 0, 0.03], [{}, 0, 0.03]]
+elements = {elements}
+
+[[initial]]
+beam = "b"
+velocity = [0, 0, -2]
+
+[[contact]]
+name = "hit"
+beams = ["a"]
+with = ["b"]
+radius = 0.01
+
+[[stage]]
+kind = "dynamic"
+end = 0.02
+step = 1e-4
+
+[output]
+nodes = ["a@0.5", "b@0.5"]
+columns = ["v", "energy"]
+"#,
+            shift - 0.5,
+            shift + 0.5
+        );
+        let simulation = simulate(&deck);
+        let [a, b] = ["a", "b"].map(|beam| simulation.end(&format!("{beam}@0.5.vz")));
+        let energy = simulation.end("energy.total");
+        println!("{elements} elements, shift {shift}: {a}, {b}, energy {energy}");
+        assert!(a < -1.5 && b > -0.5, "{elements} elements, shift {shift}: {a}, {b}");
+        assert!((energy - 1.0).abs() < 0.02, "{energy}");
+    }
+}

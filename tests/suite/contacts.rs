@@ -732,12 +732,11 @@ fn beams_and_bodies_pass_through_no_round_surface() {
     let shapes = [
         "kind = \"cylinder\"\nfrom = [-1, 0, 0]\nto = [1, 0, 0]\nradius = 0.004",
         "kind = \"capsule\"\nfrom = [-0.1, 0, 0]\nto = [0.1, 0, 0]\nradius = 0.004",
-        "kind = \"sphere\"\nat = [0, 0, 0]\nradius = 0.008",
         "kind = \"box\"\nat = [0, 0, 0]\nhalf = [0.15, 0.005, 0.01]",
     ];
     let (mut ended, mut returned) = (0, 0);
     for shape in shapes {
-        for _ in 0..6 {
+        for _ in 0..8 {
             let speed = 10.0_f64.powf(random.range(0.0, 3.5));
             let (tilt, elements) = (random.range(-0.01, 0.01), 5 + (random.range(0.0, 6.0) as usize));
             let deck = format!(
@@ -781,7 +780,7 @@ columns = ["x", "v"]
 "#,
                 0.1 + tilt,
                 0.4 / speed,
-                4e-3 / speed,
+                10.0_f64.powf(random.range(-4.3, -2.4)) / speed,
                 elements / 2,
             );
             let simulation = attempt(&deck);
@@ -800,7 +799,7 @@ columns = ["x", "v"]
         }
     }
     println!("{ended} ended, {returned} came back");
-    assert!(ended >= 10);
+    assert!(ended >= 3 && returned >= 3);
 }
 
 /// A surface stays where it is when a dynamic stage begins.

@@ -2,6 +2,7 @@
 
 use super::failure::{Attempts, Failure, Moment};
 use super::plan::{Approach, Plan, Stage};
+use crate::effect::contact;
 use crate::integrate::Scheme;
 use crate::system::Category;
 
@@ -51,6 +52,9 @@ impl Failure {
                     "the time step does not resolve the motion: {cures}; if the growth is intended, raise \
                      `energy_limit`"
                 ))
+            }
+            Self::NonFinite { effect: Some(contact::NAME), .. } => {
+                Some("give the contact a larger `stiffness`, or take more `steps` or a smaller `step`".into())
             }
             Self::NonFinite { .. } => {
                 Some("look for values near the limits of floating-point numbers in the deck".into())

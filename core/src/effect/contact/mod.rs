@@ -41,6 +41,9 @@ use std::sync::Arc;
 /// Factor of the first stiffness of points that are held in modal stages: about that of elements.
 const HELD: f64 = 1e4;
 
+/// The name of the effect
+pub const NAME: &str = "contact";
+
 /// The angle, in radians, by which a prescribed rotation may turn a surface in one step past beams
 /// that rub on it: the way of sliding is the chord of the true one, 1 % shorter for this angle.
 const LARGEST_TURN_IN_FRICTION: f64 = 0.25;
@@ -260,7 +263,7 @@ impl SurfaceContacts {
 
 impl Effect for SurfaceContacts {
     fn name(&self) -> &'static str {
-        "contact"
+        NAME
     }
 
     fn category(&self) -> Category {

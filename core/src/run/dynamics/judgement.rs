@@ -79,7 +79,7 @@ impl Dynamics<'_, '_> {
             // Penetrations of an impact fall with the root of the stiffness.
             let message = format!(
                 "stage {stage}: contacts penetrate by up to {} times `penetration`: a `stiffness` {} times as large, \
-                 with a `step` {} times as long, would keep it",
+                 with a `step` {} times as long, would keep it (a larger `penetration` allows more)",
                 two_digits(deepest),
                 two_digits(deepest * deepest),
                 two_digits(1.0 / deepest)

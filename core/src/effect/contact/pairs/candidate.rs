@@ -12,7 +12,7 @@ use crate::system::PairPointKind;
 use crate::tensor::Vec3;
 
 /// Closest points nearer to a node than this part of the element are at the node.
-const AT_NODE: f64 = 1e-6;
+pub(super) const AT_NODE: f64 = 1e-6;
 
 /// An element of a pair.
 #[derive(Clone, Copy, Debug)]

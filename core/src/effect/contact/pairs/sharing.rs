@@ -4,7 +4,7 @@
 //! between, both. The angle is that of directions at the nodes, linear along the elements, so that
 //! a point that passes from one element to the next keeps its share.
 
-use super::candidate::{Kinds, PairCandidate};
+use super::candidate::{AT_NODE, Kinds, PairCandidate};
 use super::point::PairsNow;
 use super::{BeamPairs, ElementOf};
 use crate::kernel::contact::ShapeAt;
@@ -167,8 +167,11 @@ impl PairsNow<'_> {
         let kink = self.kink(of, end, next);
         let from_kink = seen_from(kink.place) - kink.place;
         let ways = [-kink.own.dot(from_kink), kink.beyond.dot(from_kink)];
-        let both = ways[0] + ways[1];
-        if both > 0.0 { (ways[0] / both).clamp(0.0, 1.0) } else { 1.0 }
+        // The search finds no foot so near to the kink, but one at it.
+        if ways[1] <= AT_NODE * kink.length_beyond {
+            return 1.0;
+        }
+        (ways[0] / (ways[0] + ways[1])).clamp(0.0, 1.0)
     }
 
     /// The place of a beam nearest to a point, looked for from a place on one of its elements. It goes on
