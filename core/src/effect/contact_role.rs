@@ -54,9 +54,9 @@ pub trait Contacts {
     /// apart.
     fn safe_part(&self, at: &State, increment: &[Vec3]) -> f64;
 
-    /// Shows the surfaces with a prescribed motion: the name, the number of the amplitude, and whether
+    /// Shows the surfaces with a prescribed motion of which a contact acts in a state: the name, the number of the amplitude, and whether
     /// it is an angle.
-    fn driven_surfaces(&self, show: &mut dyn FnMut(&str, usize, bool));
+    fn driven_surfaces(&self, at: &State, show: &mut dyn FnMut(&str, usize, bool));
 
     /// A surface that a prescribed rotation has turned too far for contact since amplitudes were `from`:
     /// its name, and radians.

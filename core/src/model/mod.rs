@@ -212,7 +212,7 @@ impl Model {
     pub fn surface_jumps(&self, amplitudes: &[f64], state: &State) -> Vec<SurfaceJump> {
         let mut jumps = Vec::new();
         if let Some(contacts) = self.contacts() {
-            contacts.driven_surfaces(&mut |surface, amplitude, turns| {
+            contacts.driven_surfaces(state, &mut |surface, amplitude, turns| {
                 let [from, to] = [amplitudes, &state.amplitude].map(|amplitudes| amplitudes[amplitude]);
                 let size = if turns { 1.0 } else { self.length };
                 if (to - from).abs() > LARGEST_GAP * size {

@@ -300,8 +300,8 @@ impl fmt::Display for Failure {
             Self::SurfaceTurnsTooFar { at, surface, angle } => {
                 write!(
                     f,
-                    "surface \"{surface}\" is turned by {angle:.3} rad in one step ({at}): how far beams slide on it \
-                     would be unknown"
+                    "surface \"{surface}\" is turned by {angle:.3} rad in one step ({at}): how far beams slide on it, \
+                     and whether they pass through it, would be unknown"
                 )
             }
             Self::LimitPoint { at, goal, increments, end } => write!(

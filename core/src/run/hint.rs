@@ -15,7 +15,8 @@ impl Failure {
         let has = |at: &Moment| Has::new(plan, at.stage);
         match self {
             Self::NotConverged { at, tried, .. } => Some(has(at)?.hint_of_balance(tried)),
-            Self::TurnsTooFar { at, .. } | Self::SurfaceTurnsTooFar { at, .. } => Some(has(at)?.hint_of_turns()),
+            Self::TurnsTooFar { at, .. } => Some(has(at)?.hint_of_turns()),
+            Self::SurfaceTurnsTooFar { .. } => Some("take more `steps`, or a smaller `step`".into()),
             Self::LimitPoint { at, .. } => Some(has(at)?.hint_of_limit()),
             Self::StepTooSmall { at, .. } => {
                 let cures = [

@@ -155,7 +155,8 @@ impl StageRun<'_> {
     /// Refuses contacts that begin to act in this stage with a penetration.
     pub fn refuse_penetration(&self) -> Result<(), Failure> {
         let Some(contacts) = self.model.contacts() else { return Ok(()) };
-        let before = self.number.checked_sub(1);
+        // Modes and buckling leave contacts as they are.
+        let before = (0..self.number).rev().find(|&stage| self.plan.stages[stage].work.kind().advances_state());
         let begins = |amplitude: usize| before.is_none_or(|before| !self.model.amplitudes[amplitude].acts_in(before));
         let Some(Penetration { contact, surface, slot, depth }) = contacts.penetrates(self.state, &begins) else {
             return Ok(());

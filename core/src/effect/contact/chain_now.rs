@@ -5,7 +5,7 @@ use super::laws::ContactLaws;
 use super::predecessors::Predecessors;
 use super::strand::ChainNode;
 use super::surface::{SceneSurface, SurfaceCarrier};
-use crate::kernel::contact::{Carrier, ContactLaw, ContactNode, NodeBefore, NormalLaw, PointState, add_point};
+use crate::kernel::contact::{Carrier, ContactLaw, ContactNode, NodeBefore, PointState, add_point};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
 use crate::system::{ChainMemory, ContactRegime, PointMemory, Slot, State};
@@ -161,10 +161,25 @@ impl<'a> ChainNow<'a> {
         }
     }
 
+    /// True if the surface is deeper half-way between the places of a candidate in an earlier state and now,
+    /// as inside of a body, and not between two faces.
+    pub(super) fn came_through(&self, candidate: &Candidate, from: &State) -> bool {
+        let seen = |carrier: &Carrier, at: &State| carrier.on_surface(self.place_in(candidate, at));
+        let before = seen(&self.surface.carrier(from, Weights::NONE), from);
+        let after = seen(&self.carrier, self.at);
+        let heights = [before, (before + after) * 0.5, after]
+            .map(|place| candidate.distance(&self.surface.surface, place).map_or(f64::NEG_INFINITY, |it| it.value));
+        heights[1] < heights[0].min(heights[2])
+    }
+
     /// The place of a candidate (global components).
     fn place(&self, candidate: &Candidate) -> Vec3 {
+        self.place_in(candidate, self.at)
+    }
+
+    fn place_in(&self, candidate: &Candidate, at: &State) -> Vec3 {
         let nodes = self.chain.nodes_of(candidate.element);
-        let places: Vec<Vec3> = nodes.iter().map(|node| node.place + self.at.q[node.node.u as usize]).collect();
+        let places: Vec<Vec3> = nodes.iter().map(|node| node.place + at.q[node.node.u as usize]).collect();
         match &places[..] {
             [a] => *a,
             [a, b] => sum(&shape::<2>(candidate).values, &[*a, *b]),
@@ -181,19 +196,6 @@ impl<'a> ChainNow<'a> {
         let element = point.candidate.element;
         let length = self.chain.element_length(element);
         self.laws.needed_stick_factor(limit, &self.chain.stiffness[element], length, self.chain.radius)
-    }
-
-    /// Energy per time that the damping of a point takes: p_el c (dg/dt)^2.
-    pub(super) fn damping_power(&self, point: &PointNow) -> f64 {
-        let NormalLaw::Penalty { stiffness, damping, .. } = point.law.normal else { return 0.0 };
-        let elastic = stiffness * (-point.state.gap).max(0.0);
-        let force = point.state.normal_force.force;
-        if elastic == 0.0 || damping == 0.0 {
-            return 0.0;
-        }
-        // force = elastic (1 - c rate) where it is positive.
-        let rate = (1.0 - force / elastic) / damping;
-        (elastic - force) * rate
     }
 
     pub(super) fn slot_of(&self, candidate: &Candidate) -> Slot {

@@ -215,21 +215,22 @@ impl SurfaceContacts {
 
     /// A node at a point that is so deep in a surface after a time step that it may come out on another
     /// side, nearer to the middle of the surface than to its face, or that has come to another side.
-    fn sunk(&self, at: &State) -> Option<Slot> {
+    fn sunk(&self, from: &State, at: &State) -> Option<Slot> {
         let mut sunk = None;
+        let may_sink = |number: &usize| self.surfaces[self.chains[*number].surface].depth().is_finite();
         if at.contacts.regime == ContactRegime::Penalty {
-            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            for number in (0..self.chains.len()).filter(may_sink).filter(|&number| self.is_near(number, at)) {
+                let chain = self.chain_now(number, at, Weights::NONE);
                 let deepest = -0.5 * chain.surface.depth();
-                if deepest == f64::NEG_INFINITY {
-                    return;
-                }
                 chain.each_point(Weights::NONE, &mut |point, _| {
                     let before = point.partner.map_or(Vec3::ZERO, |before| before.carried.normal);
-                    if point.state.gap + chain.chain.radius < deepest || before.dot(point.state.normal) < 0.0 {
+                    let has_turned = before.dot(point.state.normal) < 0.0;
+                    let height = point.state.gap + chain.chain.radius;
+                    if height < deepest || (has_turned && chain.came_through(point.candidate, from)) {
                         sunk = Some(chain.slot_of(point.candidate));
                     }
                 });
-            });
+            }
         }
         sunk
     }
@@ -253,7 +254,9 @@ impl SurfaceContacts {
         let mut power = 0.0;
         if at.contacts.regime == ContactRegime::Penalty && self.laws.iter().any(|laws| laws.damping != 0.0) {
             self.each_chain(at, Weights::NONE, &mut |_, chain| {
-                chain.each_point(Weights::NONE, &mut |point, _| power += chain.damping_power(point));
+                chain.each_point(Weights::NONE, &mut |point, _| {
+                    power += point.law.normal.damping_power(point.state.gap, point.state.normal_force.force);
+                });
             });
             power += self.pairs().damping_power(at);
         }
@@ -550,8 +553,9 @@ impl Contacts for SurfaceContacts {
         deeper(deepest, self.pairs().hidden_penetration(at))
     }
 
-    fn driven_surfaces(&self, show: &mut dyn FnMut(&str, usize, bool)) {
-        for SceneSurface { name, carrier, .. } in &self.surfaces {
+    fn driven_surfaces(&self, at: &State, show: &mut dyn FnMut(&str, usize, bool)) {
+        let acts = |number: usize| self.acting(at).any(|(chain, ..)| chain.surface == number);
+        for (_, SceneSurface { name, carrier, .. }) in self.surfaces.iter().enumerate().filter(|(k, _)| acts(*k)) {
             match *carrier {
                 SurfaceCarrier::Ground | SurfaceCarrier::Node { .. } => {}
                 SurfaceCarrier::Shift { amplitude, .. } => show(name, amplitude, false),
@@ -579,7 +583,7 @@ impl Contacts for SurfaceContacts {
         let of_chain = |(chain, _, surface): (&Chain, &ContactLaws, &SceneSurface)| {
             passing::passed(chain, surface, from, to).map(|node| chain.nodes[node].node.u)
         };
-        let of_surfaces = self.acting(to).find_map(of_chain).or_else(|| self.sunk(to));
+        let of_surfaces = self.acting(to).find_map(of_chain).or_else(|| self.sunk(from, to));
         of_surfaces.or_else(|| self.turned_over(to)).or_else(|| self.pairs().passed(from, to))
     }
 

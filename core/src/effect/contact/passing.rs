@@ -58,8 +58,8 @@ impl Way<'_> {
         moved > reach && has_turned
     }
 
-    /// The same for places between the ends of an element, so near to each other that the surface does not
-    /// fit between them.
+    /// The same for places on the chord between two nodes, so near to each other that the surface does not
+    /// fit between them, unless the chord is longer than 32 times its thickness.
     fn chord_passes(&self, before: [Vec3; 2], after: [Vec3; 2]) -> bool {
         let moved = (after[0] - before[0]).norm().max((after[1] - before[1]).norm());
         if moved <= self.radius.min(self.depth) {

@@ -100,6 +100,18 @@ impl NormalLaw {
         }
     }
 
+    /// Energy per time that damping takes, p_el c (dg/dt)^2, where the gap has this force.
+    pub fn damping_power(&self, gap: f64, force: f64) -> f64 {
+        let Self::Penalty { stiffness, damping, offset } = *self else { return 0.0 };
+        let elastic = stiffness * (offset - gap).max(0.0);
+        if elastic == 0.0 || damping == 0.0 {
+            return 0.0;
+        }
+        // force = elastic (1 - c rate) where it is positive.
+        let rate = (1.0 - force / elastic) / damping;
+        (elastic - force) * rate
+    }
+
     /// The gap at which the force begins.
     pub fn offset(&self) -> f64 {
         match *self {

@@ -41,9 +41,9 @@ impl Dynamics<'_, '_> {
         let stage = self.stage.number + 1;
         let percent = 100.0 * share.abs();
         if !is_own {
-            let off = share.abs() * self.stage.bookkeeper.scale();
-            let why = if self.stage.state.contacts.taken_over > OWN_PART * off {
-                "contacts hold the forces of the static stage before by springs, whose energy is new: parts that lift \
+            let gained = share * self.stage.bookkeeper.scale();
+            let why = if gained > 0.0 && self.stage.state.contacts.taken_over > OWN_PART * gained {
+                "contacts hold the forces of a static stage by springs, whose energy is new: parts that lift \
                  off take it along (give the contact a larger `stiffness`)"
             } else {
                 "the work of earlier stages is integrated by the trapezoidal rule between load levels (use more \

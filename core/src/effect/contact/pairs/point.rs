@@ -171,6 +171,7 @@ impl<'a> PairsNow<'a> {
     /// The points that hold by penalties what multipliers held. A static stage gives each point its own
     /// force; in a dynamic one points share a force by weights. Each candidate takes the forces of the
     /// point in memory that it was and of those at its place, divided by the weights of all that do.
+    /// Rows show no pushes before the first step.
     pub fn holding_points(&self) -> Vec<PairPointMemory> {
         let mut out = Vec::new();
         let mut first = 0;
@@ -200,17 +201,27 @@ impl<'a> PairsNow<'a> {
             let links = self.links(&self.list[*number], candidate, known).into_iter();
             links.filter(|link| link.shift < AT_ONE_PLACE || was.own == Some(link.point)).collect()
         };
-        let held: Vec<Vec<Link>> = found.iter().zip(&was).map(held_by).collect();
+        let mut held: Vec<Vec<Link>> = found.iter().zip(&was).map(held_by).collect();
         let mut weights = vec![0.0; known.len()];
         for (Found { candidate, .. }, links) in found.iter().zip(&held) {
             links.iter().for_each(|link| weights[link.point] += candidate.weight);
+        }
+        // Where the kind of points changes, those beside take the force, by how near they are.
+        let is_left: Vec<bool> = weights.iter().map(|weight| *weight == 0.0).collect();
+        let nearness = |link: &Link| if is_left[link.point] { (2.0 - link.shift).max(0.0) } else { 1.0 };
+        for (Found { number, candidate }, held) in found.iter().zip(&mut held) {
+            let links = self.links(&self.list[*number], candidate, known).into_iter();
+            for link in links.filter(|link| is_left[link.point] && nearness(link) > 0.0) {
+                weights[link.point] += candidate.weight * nearness(&link);
+                held.push(link);
+            }
         }
         for (Found { number, candidate }, links) in found.iter().zip(&held) {
             let Some(nearest) = links.iter().min_by(|a, b| a.shift.total_cmp(&b.shift)) else { continue };
             let nearest = &known[nearest.point];
             let (mut force, mut traction) = (0.0, Vec3::ZERO);
             for link in links {
-                let part = known[link.point].weight / weights[link.point];
+                let part = known[link.point].weight * nearness(link) / weights[link.point];
                 force += known[link.point].point.force * part;
                 traction += known[link.point].point.carried.force * part;
             }
@@ -337,7 +348,12 @@ impl<'a> PairsNow<'a> {
         let Part { pair, candidate, partner, .. } = part;
         let contacts = &self.at.contacts;
         let stiffness = self.stiffness(pair);
-        let normal = laws.normal_law(partner.map(|known| &known.point), &stiffness, contacts);
+        // A point whose share grows pushes no more by its offset than before.
+        let lessened = partner.map(|known| {
+            let part = (known.weight / candidate.weight).min(1.0);
+            PointMemory { offset: known.point.offset * part, ..known.point }
+        });
+        let normal = laws.normal_law(lessened.as_ref(), &stiffness, contacts);
         let [a, b] = self.pairs.both(pair.meeting as usize);
         let friction = self.friction(pair, candidate, laws);
         let carrier = if friction.is_some() { self.carrier(pair, *partner) } else { 0 };

@@ -6,7 +6,7 @@ use crate::effect::contact::laws::{ContactLaws, RELEVANT_FORCE, ROUNDED};
 use crate::effect::contact::strand::ContactStiffness;
 use crate::effect::{ContactChange, ContactResultant, ContactSurvey, Penetration};
 use crate::kernel::Weights;
-use crate::kernel::contact::{NormalLaw, Status};
+use crate::kernel::contact::Status;
 use crate::system::{Assembler, ListedPair, PairPointKind, PairPointMemory, PointMemory, Slot, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
@@ -224,17 +224,12 @@ impl<'a> PairRole<'a> {
         energy
     }
 
-    /// Energy per time that damping takes: p_el c (dg/dt)^2.
+    /// Energy per time that damping takes.
     pub fn damping_power(self, at: &State) -> f64 {
         let mut power = 0.0;
         self.each(at, &mut |point| {
-            let NormalLaw::Penalty { stiffness, damping, .. } = point.law.normal else { return };
-            let elastic = stiffness * (-point.state.gap).max(0.0);
-            let force = point.state.normal_force.force;
-            if elastic > 0.0 && damping > 0.0 {
-                let rate = (1.0 - force / elastic) / damping;
-                power += point.candidate.weight * (elastic - force) * rate;
-            }
+            let of_point = point.law.normal.damping_power(point.state.gap, point.state.normal_force.force);
+            power += point.candidate.weight * of_point;
         });
         power
     }
