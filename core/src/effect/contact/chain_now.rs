@@ -123,7 +123,8 @@ impl<'a> ChainNow<'a> {
     fn law(&self, candidate: &Candidate, predecessors: &Predecessors, partner: Option<&PointMemory>) -> ContactLaw {
         let contacts = &self.at.contacts;
         let stiffness = self.chain.stiffness[candidate.element];
-        let normal = self.laws.normal_law(partner, &stiffness, contacts);
+        let [multiplier, offset] = partner.map_or([0.0; 2], |point| [point.multiplier, point.offset]);
+        let normal = self.laws.normal_law(multiplier, offset, &stiffness, contacts);
         let coefficient = self.laws.friction_at(self.chain.fraction(candidate));
         let friction = self.laws.friction(self.chain.contact, coefficient, &stiffness, contacts);
         let points = self.memory.map_or(&[][..], |memory| &memory.points);
@@ -140,8 +141,7 @@ impl<'a> ChainNow<'a> {
         let first = stiffness.first(self.at.contacts.regime);
         let carried = if accepts { self.laws.carried(law.friction.is_some(), first, state) } else { law.carried };
         let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
-        let gap = state.gap;
-        let force = state.normal_force.force;
+        let (gap, force) = (state.gap, state.normal_force.force);
         // The next level begins with the first stiffness.
         let next = stiffness.augmented * self.at.contacts.first_factor;
         let multiplier = if accepts { force + next * gap } else { force };
@@ -161,9 +161,18 @@ impl<'a> ChainNow<'a> {
         }
     }
 
+    /// True if a point is nearer to the middle of the surface than to its face, or has come through it since
+    /// an earlier state.
+    pub(super) fn has_sunk(&self, point: &PointNow, from: &State) -> bool {
+        let before = point.partner.map_or(Vec3::ZERO, |before| before.carried.normal);
+        let has_turned = before.dot(point.state.normal) < 0.0;
+        let height = point.state.gap + self.chain.radius;
+        height < -0.5 * self.surface.depth() || (has_turned && self.came_through(point.candidate, from))
+    }
+
     /// True if the surface is deeper half-way between the places of a candidate in an earlier state and now,
     /// as inside of a body, and not between two faces.
-    pub(super) fn came_through(&self, candidate: &Candidate, from: &State) -> bool {
+    fn came_through(&self, candidate: &Candidate, from: &State) -> bool {
         let seen = |carrier: &Carrier, at: &State| carrier.on_surface(self.place_in(candidate, at));
         let before = seen(&self.surface.carrier(from, Weights::NONE), from);
         let after = seen(&self.carrier, self.at);

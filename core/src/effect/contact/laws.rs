@@ -2,7 +2,7 @@
 
 use super::strand::ContactStiffness;
 use crate::kernel::contact::{CarriedTraction, FrictionLaw, NormalLaw, PointState, Status};
-use crate::system::{ContactMemory, ContactRegime, PointMemory};
+use crate::system::{ContactMemory, ContactRegime};
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
@@ -71,15 +71,16 @@ impl ContactLaws {
         })
     }
 
-    /// The law of normal forces in a state, at a point that was `partner` before. Where the
-    /// tangent resists, a point that had a force has the tangent of a contact even if it opens.
+    /// The law of normal forces in a state, at a point with this multiplier in static stages and this
+    /// offset in dynamic ones. Where the tangent resists, a point that had a force has the tangent of a
+    /// contact even if it opens.
     pub(super) fn normal_law(
         &self,
-        partner: Option<&PointMemory>,
+        multiplier: f64,
+        offset: f64,
         stiffness: &ContactStiffness,
         contacts: &ContactMemory,
     ) -> NormalLaw {
-        let multiplier = partner.map_or(0.0, |point| point.multiplier);
         match contacts.regime {
             ContactRegime::Augmented => NormalLaw::Augmented {
                 multiplier,
@@ -91,7 +92,6 @@ impl ContactLaws {
                 },
             },
             ContactRegime::Penalty => {
-                let offset = partner.map_or(0.0, |point| point.offset);
                 NormalLaw::Penalty { stiffness: stiffness.penalty, damping: self.damping, offset }
             }
         }

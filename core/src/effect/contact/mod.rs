@@ -48,8 +48,8 @@ pub const NAME: &str = "contact";
 /// that rub on it: the way of sliding is the chord of the true one, 1 % shorter for this angle.
 const LARGEST_TURN_IN_FRICTION: f64 = 0.25;
 
-/// The same where no beam rubs on the surface: beams are looked for along chords.
-const LARGEST_TURN: f64 = 1.0;
+/// The same where beams are near and none rubs on the surface: they are looked for along chords.
+const LARGEST_TURN_NEARBY: f64 = 1.0;
 
 /// All contacts with rigid surfaces, and of beams with each other.
 #[derive(Clone, Debug, Default)]
@@ -179,7 +179,7 @@ impl SurfaceContacts {
     }
 
     /// Changes the memory of all points with a force; shows them with the stiffness of their element.
-    fn change_points(&self, at: &mut State, change: &mut dyn FnMut(&mut PointMemory, &ContactStiffness)) {
+    fn change_points(&self, at: &mut State, change: impl Fn(&mut PointMemory, &ContactStiffness)) {
         let mut chains = (*at.contacts.chains).clone();
         for (chain, memory) in self.chains.iter().zip(&mut chains) {
             for point in &mut memory.points {
@@ -188,7 +188,7 @@ impl SurfaceContacts {
             }
         }
         at.contacts.chains = Arc::new(chains);
-        self.pairs().change_points(at, change);
+        self.pairs().change_points(at, &change);
     }
 
     /// Notes the deepest penetration and the shortest contact of a time step.
@@ -213,41 +213,24 @@ impl SurfaceContacts {
         self.pairs().judge_penalty(at);
     }
 
-    /// A node at a point that is so deep in a surface after a time step that it may come out on another
-    /// side, nearer to the middle of the surface than to its face, or that has come to another side.
-    fn sunk(&self, from: &State, at: &State) -> Option<Slot> {
-        let mut sunk = None;
-        let may_sink = |number: &usize| self.surfaces[self.chains[*number].surface].depth().is_finite();
-        if at.contacts.regime == ContactRegime::Penalty {
-            for number in (0..self.chains.len()).filter(may_sink).filter(|&number| self.is_near(number, at)) {
-                let chain = self.chain_now(number, at, Weights::NONE);
-                let deepest = -0.5 * chain.surface.depth();
-                chain.each_point(Weights::NONE, &mut |point, _| {
-                    let before = point.partner.map_or(Vec3::ZERO, |before| before.carried.normal);
-                    let has_turned = before.dot(point.state.normal) < 0.0;
-                    let height = point.state.gap + chain.chain.radius;
-                    if height < deepest || (has_turned && chain.came_through(point.candidate, from)) {
-                        sunk = Some(chain.slot_of(point.candidate));
-                    }
-                });
-            }
-        }
-        sunk
-    }
-
-    /// A node at a point with friction whose normal has turned over since the last converged state.
-    fn turned_over(&self, at: &State) -> Option<Slot> {
-        let mut turned = None;
-        if self.rubs() {
-            self.each_chain(at, Weights::NONE, &mut |_, chain| {
-                chain.each_point(Weights::NONE, &mut |point, _| {
-                    if point.state.traction.turned_over {
-                        turned = Some(chain.slot_of(point.candidate));
-                    }
-                });
+    /// A node at a point that may be on a wrong side of its surface: one with friction whose normal has turned
+    /// over since the last converged state `from`; after a time step also one that is nearer to the middle
+    /// of the surface than to its face, from where it may come out on another side, or that has come out.
+    fn strayed(&self, from: &State, at: &State) -> Option<Slot> {
+        let is_penalty = at.contacts.regime == ContactRegime::Penalty;
+        let may_sink = |chain: &Chain| is_penalty && self.surfaces[chain.surface].depth().is_finite();
+        let may_stray = |chain: &Chain| may_sink(chain) || self.laws[chain.contact].rubs();
+        let mut strayed = None;
+        for number in (0..self.chains.len()).filter(|&k| may_stray(&self.chains[k]) && self.is_near(k, at)) {
+            let chain = self.chain_now(number, at, Weights::NONE);
+            let sinks = may_sink(chain.chain);
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                if point.state.traction.turned_over || (sinks && chain.has_sunk(point, from)) {
+                    strayed = Some(chain.slot_of(point.candidate));
+                }
             });
         }
-        turned.or_else(|| self.pairs().turned_over(at))
+        strayed
     }
 
     fn damping_power(&self, at: &State) -> f64 {
@@ -437,7 +420,7 @@ impl Contacts for SurfaceContacts {
     fn hold(&self, at: &mut State) {
         at.contacts.regime = ContactRegime::Augmented;
         at.contacts.factor = HELD;
-        self.change_points(at, &mut |point, stiffness| {
+        self.change_points(at, |point, stiffness| {
             point.multiplier = point.force + stiffness.augmented * HELD * point.gap
         });
     }
@@ -445,11 +428,10 @@ impl Contacts for SurfaceContacts {
     fn begin_penalty(&self, at: &mut State) {
         at.contacts.deepest = 0.0;
         at.contacts.shortest = None;
-        at.contacts.regime = ContactRegime::Augmented;
         let before = Contacts::energy(self, at);
         at.contacts.regime = ContactRegime::Penalty;
         self.pairs().begin_penalty(at);
-        self.change_points(at, &mut |point, stiffness| {
+        self.change_points(at, |point, stiffness| {
             point.offset = point.force / stiffness.penalty + point.gap;
             point.steps = 0;
         });
@@ -554,8 +536,9 @@ impl Contacts for SurfaceContacts {
     }
 
     fn driven_surfaces(&self, at: &State, show: &mut dyn FnMut(&str, usize, bool)) {
-        let acts = |number: usize| self.acting(at).any(|(chain, ..)| chain.surface == number);
-        for (_, SceneSurface { name, carrier, .. }) in self.surfaces.iter().enumerate().filter(|(k, _)| acts(*k)) {
+        let acts = |number: &usize| self.acting(at).any(|(chain, ..)| chain.surface == *number);
+        for number in (0..self.surfaces.len()).filter(acts) {
+            let SceneSurface { name, carrier, .. } = &self.surfaces[number];
             match *carrier {
                 SurfaceCarrier::Ground | SurfaceCarrier::Node { .. } => {}
                 SurfaceCarrier::Shift { amplitude, .. } => show(name, amplitude, false),
@@ -574,7 +557,7 @@ impl Contacts for SurfaceContacts {
             }
             let touches = at.contacts.chains.get(number).is_some_and(|memory| !memory.points.is_empty());
             let rubs = touches && self.laws[chain.contact].rubs();
-            (rubs || angle > LARGEST_TURN).then_some((surface.name.as_str(), angle))
+            (rubs || angle > LARGEST_TURN_NEARBY).then_some((surface.name.as_str(), angle))
         };
         (0..self.chains.len()).find_map(too_far)
     }
@@ -583,8 +566,8 @@ impl Contacts for SurfaceContacts {
         let of_chain = |(chain, _, surface): (&Chain, &ContactLaws, &SceneSurface)| {
             passing::passed(chain, surface, from, to).map(|node| chain.nodes[node].node.u)
         };
-        let of_surfaces = self.acting(to).find_map(of_chain).or_else(|| self.sunk(from, to));
-        of_surfaces.or_else(|| self.turned_over(to)).or_else(|| self.pairs().passed(from, to))
+        let of_surfaces = self.acting(to).find_map(of_chain).or_else(|| self.strayed(from, to));
+        of_surfaces.or_else(|| self.pairs().turned_over(to)).or_else(|| self.pairs().passed(from, to))
     }
 
     fn energy(&self, at: &State) -> f64 {

@@ -6,6 +6,7 @@
 
 mod candidate;
 mod friction;
+mod holding;
 mod list;
 mod point;
 mod role;

@@ -15,10 +15,6 @@ use crate::system::{ContactRegime, ListedPair, PairPointKind, PairPointMemory, P
 use crate::tensor::{Mat3, Vec3};
 use std::borrow::Cow;
 
-/// Points of two elements are at one place if their places along both beams differ by less than this, in
-/// elements: those at a common node of two elements.
-const AT_ONE_PLACE: f64 = 1e-3;
-
 /// A contact point of two beams in a state.
 pub(super) struct PairPoint<'a> {
     /// Number of the pair in the list
@@ -62,9 +58,9 @@ impl PairPoint<'_> {
 }
 
 /// A candidate with the number of its pair.
-struct Found {
-    number: usize,
-    candidate: PairCandidate,
+pub(super) struct Found {
+    pub(super) number: usize,
+    pub(super) candidate: PairCandidate,
 }
 
 /// A candidate with its pair, and the points in memory that it was.
@@ -81,7 +77,7 @@ struct Part<'a> {
 /// A look at listed pairs in a state.
 pub(super) struct PairsNow<'a> {
     pub(super) pairs: &'a BeamPairs,
-    laws: &'a [ContactLaws],
+    pub(super) laws: &'a [ContactLaws],
     pub(super) at: &'a State,
     /// The list, which is that of the state but in an assembly of another one
     pub(super) list: &'a [ListedPair],
@@ -144,14 +140,7 @@ impl<'a> PairsNow<'a> {
         visit: &mut dyn FnMut(&PairPoint<'a>, &ElementSystem),
     ) {
         let (first_known, known) = self.memory_of_meeting(group[0].meeting);
-        let reach = self.reach(known, laws);
-        let mut found = Vec::new();
-        for (number, pair) in (first..).zip(group) {
-            if self.pairs.chord_gap(pair, &self.places) <= reach {
-                let candidates = self.sharing_candidates(pair, reach);
-                found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
-            }
-        }
+        let found = self.found(first, group, self.reach(known, laws));
         let all = self.predecessors(&found, known, laws);
         let orders = self.pairs.both(group[0].meeting as usize).map(|strand| strand.order);
         let mut system = ElementSystem::new(2 * (orders[0] + orders[1] + 2));
@@ -168,74 +157,21 @@ impl<'a> PairsNow<'a> {
         }
     }
 
-    /// The points that hold by penalties what multipliers held. A static stage gives each point its own
-    /// force; in a dynamic one points share a force by weights. Each candidate takes the forces of the
-    /// point in memory that it was and of those at its place, divided by the weights of all that do.
-    /// Rows show no pushes before the first step.
-    pub fn holding_points(&self) -> Vec<PairPointMemory> {
-        let mut out = Vec::new();
-        let mut first = 0;
-        for group in self.list.chunk_by(|a, b| a.meeting == b.meeting) {
-            self.hold_meeting(first, group, &mut out);
-            first += group.len();
-        }
-        sort(&mut out);
-        out
-    }
-
-    fn hold_meeting(&self, first: usize, group: &[ListedPair], out: &mut Vec<PairPointMemory>) {
-        let (_, known) = self.memory_of_meeting(group[0].meeting);
-        if known.is_empty() {
-            return;
-        }
-        let laws = &self.laws[self.pairs.contact_of(group[0].meeting as usize)];
+    /// The candidates of the pairs of a meeting, of which `first` is the number of the first one. `reach`: the
+    /// largest gap with a force.
+    pub(super) fn found(&self, first: usize, group: &[ListedPair], reach: f64) -> Vec<Found> {
         let mut found = Vec::new();
         for (number, pair) in (first..).zip(group) {
-            if self.pairs.chord_gap(pair, &self.places) <= laws.penetration {
-                let candidates = self.sharing_candidates(pair, laws.penetration);
+            if self.pairs.chord_gap(pair, &self.places) <= reach {
+                let candidates = self.sharing_candidates(pair, reach);
                 found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
             }
         }
-        let was = self.predecessors(&found, known, laws);
-        let held_by = |(Found { number, candidate }, was): (&Found, &Predecessors)| -> Vec<Link> {
-            let links = self.links(&self.list[*number], candidate, known).into_iter();
-            links.filter(|link| link.shift < AT_ONE_PLACE || was.own == Some(link.point)).collect()
-        };
-        let mut held: Vec<Vec<Link>> = found.iter().zip(&was).map(held_by).collect();
-        let mut weights = vec![0.0; known.len()];
-        for (Found { candidate, .. }, links) in found.iter().zip(&held) {
-            links.iter().for_each(|link| weights[link.point] += candidate.weight);
-        }
-        // Where the kind of points changes, those beside take the force, by how near they are.
-        let is_left: Vec<bool> = weights.iter().map(|weight| *weight == 0.0).collect();
-        let nearness = |link: &Link| if is_left[link.point] { (2.0 - link.shift).max(0.0) } else { 1.0 };
-        for (Found { number, candidate }, held) in found.iter().zip(&mut held) {
-            let links = self.links(&self.list[*number], candidate, known).into_iter();
-            for link in links.filter(|link| is_left[link.point] && nearness(link) > 0.0) {
-                weights[link.point] += candidate.weight * nearness(&link);
-                held.push(link);
-            }
-        }
-        for (Found { number, candidate }, links) in found.iter().zip(&held) {
-            let Some(nearest) = links.iter().min_by(|a, b| a.shift.total_cmp(&b.shift)) else { continue };
-            let nearest = &known[nearest.point];
-            let (mut force, mut traction) = (0.0, Vec3::ZERO);
-            for link in links {
-                let part = known[link.point].weight * nearness(link) / weights[link.point];
-                force += known[link.point].point.force * part;
-                traction += known[link.point].point.carried.force * part;
-            }
-            let elements = self.list[*number].elements;
-            let [place, on_second] = [0, 1].map(|side| f64::from(elements[side]) + candidate.at[side]);
-            let carried = CarriedTraction { force: traction, ..nearest.point.carried };
-            let point = PointMemory { place, force, carried, ..nearest.point };
-            out.push(PairPointMemory { kind: candidate.kind, on_second, weight: candidate.weight, point, ..*nearest });
-        }
-        out.extend(known.iter().zip(&weights).filter(|(_, weight)| **weight == 0.0).map(|(point, _)| *point));
+        found
     }
 
     /// The points of a meeting that had a force, and the number of the first of them.
-    fn memory_of_meeting(&self, meeting: u32) -> (usize, &'a [PairPointMemory]) {
+    pub(super) fn memory_of_meeting(&self, meeting: u32) -> (usize, &'a [PairPointMemory]) {
         let points = &self.at.contacts.pairs.points;
         let first = points.partition_point(|point| point.meeting < meeting);
         let end = points.partition_point(|point| point.meeting <= meeting);
@@ -333,7 +269,12 @@ impl<'a> PairsNow<'a> {
     }
 
     /// The points in memory that each candidate was.
-    fn predecessors(&self, found: &[Found], known: &[PairPointMemory], laws: &ContactLaws) -> Vec<Predecessors> {
+    pub(super) fn predecessors(
+        &self,
+        found: &[Found],
+        known: &[PairPointMemory],
+        laws: &ContactLaws,
+    ) -> Vec<Predecessors> {
         let mut all = Vec::new();
         for (candidate, Found { number, candidate: at }) in found.iter().enumerate() {
             let links = self.links(&self.list[*number], at, known);
@@ -348,12 +289,10 @@ impl<'a> PairsNow<'a> {
         let Part { pair, candidate, partner, .. } = part;
         let contacts = &self.at.contacts;
         let stiffness = self.stiffness(pair);
+        let multiplier = partner.map_or(0.0, |known| known.point.multiplier);
         // A point whose share grows pushes no more by its offset than before.
-        let lessened = partner.map(|known| {
-            let part = (known.weight / candidate.weight).min(1.0);
-            PointMemory { offset: known.point.offset * part, ..known.point }
-        });
-        let normal = laws.normal_law(lessened.as_ref(), &stiffness, contacts);
+        let offset = partner.map_or(0.0, |known| known.point.offset * (known.weight / candidate.weight).min(1.0));
+        let normal = laws.normal_law(multiplier, offset, &stiffness, contacts);
         let [a, b] = self.pairs.both(pair.meeting as usize);
         let friction = self.friction(pair, candidate, laws);
         let carrier = if friction.is_some() { self.carrier(pair, *partner) } else { 0 };
@@ -425,8 +364,7 @@ impl<'a> PairsNow<'a> {
         let PairPoint { pair, candidate, state, law, .. } = point;
         let [a, _] = self.pairs.both(pair.meeting as usize);
         let contacts = &self.at.contacts;
-        let gap = state.gap;
-        let force = state.normal_force.force;
+        let (gap, force) = (state.gap, state.normal_force.force);
         let normal = point.normal();
         // Stages go on with the first stiffness.
         let first = self.stiffness(pair).augmented * contacts.first_factor;
@@ -460,7 +398,7 @@ impl<'a> PairsNow<'a> {
     }
 
     /// The points in memory of a meeting near a candidate, which is number 0.
-    fn links(&self, pair: &ListedPair, candidate: &PairCandidate, memory: &[PairPointMemory]) -> Vec<Link> {
+    pub(super) fn links(&self, pair: &ListedPair, candidate: &PairCandidate, memory: &[PairPointMemory]) -> Vec<Link> {
         let strands = self.pairs.both(pair.meeting as usize);
         let along = [0, 1].map(|side| f64::from(pair.elements[side]) + candidate.at[side]);
         // The memory is in the order of places; a ring goes on at its start.

@@ -97,12 +97,11 @@ impl<'a> PairRole<'a> {
 
     /// Lets points share what multipliers held.
     pub fn begin_penalty(self, at: &mut State) {
-        let points = self.now(at).holding_points();
-        at.contacts.pairs.points = Arc::new(points);
+        at.contacts.pairs.points = Arc::new(self.now(at).holding_points());
     }
 
     /// Changes the memory of all points; shows them with the stiffness of their pair.
-    pub fn change_points(self, at: &mut State, change: &mut dyn FnMut(&mut PointMemory, &ContactStiffness)) {
+    pub fn change_points(self, at: &mut State, change: &impl Fn(&mut PointMemory, &ContactStiffness)) {
         let mut points = (*at.contacts.pairs.points).clone();
         let now = self.now(at);
         for point in &mut points {
