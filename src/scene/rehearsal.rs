@@ -1,7 +1,7 @@
 //! Errors and warnings about stages that are found before anything is computed, with their places
 //! in the deck.
 
-use super::compose::{DrivenTable, MOTION_OF_A_SURFACE};
+use super::compose::DrivenTable;
 use crate::deck::{Deck, Diagnostic, HistoryBody, HistoryTable, Span};
 use beamsim_core::model::{StageError, StageKind};
 use beamsim_core::run::{Driven, HistoryJump, JumpKind, Plan, refusal, refusal_help, rehearse};
@@ -77,10 +77,10 @@ impl Teller<'_> {
         self.plan.stages[stage].work.kind()
     }
 
-    /// Motors and surfaces that jump into a dynamic stage are refused, not warned of.
+    /// Motors that jump into a dynamic stage are refused, not warned of.
     fn concerns(&self, jump: &HistoryJump, table: &DrivenTable) -> bool {
         let jumps = matches!(jump.how, JumpKind::Value { .. }) && self.kind(jump.stage).advances_time();
-        !(jumps && (self.is_motor(table) || table.what == MOTION_OF_A_SURFACE))
+        !(jumps && self.is_motor(table))
     }
 
     fn is_motor(&self, table: &DrivenTable) -> bool {

@@ -171,7 +171,7 @@ impl Schedule {
     }
 
     /// Sets the clock and the load factor, the loads that belong to them, and the prescribed
-    /// motions. Where a motion turns its node too far at once, its slot and the angle are returned.
+    /// motions. Returns what turns too far at once.
     pub fn set_clock(&self, model: &Model, state: &mut State, time: f64, load: f64) -> Option<TooFar> {
         let before = state.amplitude.clone();
         (state.time, state.load) = (time, load);

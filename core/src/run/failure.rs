@@ -334,7 +334,7 @@ impl fmt::Display for Failure {
             Self::ContactPassed { at, node } => write!(
                 f,
                 "node \"{node}\" may have passed through a surface or a beam: in one step it moves by more than the \
-                 depth of the surface, or a contact of beams is too soft to keep them apart ({at})"
+                 depth of the surface, or the contact is too soft to keep them apart ({at})"
             ),
             Self::SliderEnd { at, node } => {
                 write!(f, "node \"{node}\" slides beyond the end of the beam on which it slides ({at})")

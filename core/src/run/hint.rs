@@ -42,7 +42,7 @@ impl Failure {
             Self::SliderEnd { .. } => Some(
                 "end the stage before (`until`), make the beam longer, or stop the node by a spring".into(),
             ),
-            Self::ContactPassed { .. } => {
+            Self::ContactPassed { .. } | Self::NonFinite { effect: Some(contact::NAME), .. } => {
                 Some("give the contact a larger `stiffness`, or take more `steps` or a smaller `step`".into())
             }
             Self::MeshTooCoarse { .. } => Some("use more `elements` there".into()),
@@ -53,9 +53,6 @@ impl Failure {
                     "the time step does not resolve the motion: {cures}; if the growth is intended, raise \
                      `energy_limit`"
                 ))
-            }
-            Self::NonFinite { effect: Some(contact::NAME), .. } => {
-                Some("give the contact a larger `stiffness`, or take more `steps` or a smaller `step`".into())
             }
             Self::NonFinite { .. } => {
                 Some("look for values near the limits of floating-point numbers in the deck".into())

@@ -1,6 +1,6 @@
 //! Contacts of beams and bodies with surfaces, and of beams with beams.
 
-use super::{Composer, DrivenTable, MOTION_OF_A_SURFACE, stage_set};
+use super::{Composer, DrivenTable, stage_set};
 use crate::deck::{
     self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, SectionBody, Shape, Spanned, Stage,
     StageBody, SurfaceMotion,
@@ -136,7 +136,7 @@ impl Composer<'_> {
         let number = self.out.amplitudes.len() - 1;
         self.out.driven.push(DrivenTable {
             drives: Driven::Amplitude(number),
-            what: MOTION_OF_A_SURFACE,
+            what: "motion of a surface",
             span: table.span.clone(),
             history: table.history.clone(),
         });

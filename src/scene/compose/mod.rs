@@ -41,9 +41,6 @@ pub struct Reason {
     pub reason: String,
 }
 
-/// The name of a surface that moves in messages: no other table shares its amplitude.
-pub const MOTION_OF_A_SURFACE: &str = "motion of a surface";
-
 /// A table that a history drives, for messages.
 #[derive(Clone)]
 pub struct DrivenTable {

@@ -43,8 +43,8 @@ impl Dynamics<'_, '_> {
         if !is_own {
             let gained = share * self.stage.bookkeeper.scale();
             let why = if gained > 0.0 && self.stage.state.contacts.taken_over > OWN_PART * gained {
-                "contacts hold the forces of a static stage by springs, whose energy is new: parts that lift \
-                 off take it along (give the contact a larger `stiffness`)"
+                "the springs that hold the contact forces of a static stage in this one store energy that no load \
+                 gave (give the contact a larger `stiffness`)"
             } else {
                 "the work of earlier stages is integrated by the trapezoidal rule between load levels (use more \
                  `steps` there)"
