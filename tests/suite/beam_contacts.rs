@@ -668,82 +668,40 @@ columns = ["u", "contact"]
     assert!((normal - 1e3 * depth).abs() < 1e-9 * normal, "{normal} {depth}");
 }
 
+/// A straight bar of radius 0.01 from one place to another.
+fn bar(ends: [[f64; 3]; 2], elements: usize) -> Bar {
+    Bar { ends: ends.map(Vec3), elements, order: 1, radius: 0.01 }
+}
+
+/// Two bars whose ends are clamped, one on the other. The upper one is loaded along its length.
+fn pressed([upper, lower]: [&Bar; 2], contact: &str, stages: &str) -> String {
+    let clamp = |at: &str| format!("[[support]]\nat = \"{at}\"\nfix = \"all\"\n");
+    [
+        "[section.s]\nEA = 1e6\nGA = 1e4\nGJ = 1\nEI = 1\nrhoA = 0.1\nrhoJ = [1e-5, 5e-6, 5e-6]\n".to_string(),
+        upper.deck("upper"),
+        lower.deck("lower"),
+        ["upper@start", "upper@end", "lower@start", "lower@end"].map(clamp).concat(),
+        "[[load]]\nalong = \"upper\"\nforce = [0, 0, -0.5]\n".into(),
+        format!("[[contact]]\nname = \"k\"\nbeams = [\"upper\"]\nwith = [\"lower\"]\nradius = 0.01\n{contact}\n"),
+        format!("{stages}[output]\nnodes = [\"upper@0.5\"]\ncolumns = [\"u\", \"contact\", \"energy\"]\n"),
+    ]
+    .concat()
+}
+
 /// What a static stage has pressed together stays as it is in a dynamic one with the same loads, whatever
 /// the angle between the beams and wherever their nodes are.
 #[test]
 fn forces_stay_from_a_static_to_a_dynamic_stage() {
+    let stages = "[[stage]]\nkind = \"static\"\nsteps = 4\n[[stage]]\nkind = \"dynamic\"\nend = 0.05\nstep = 1e-3\n\
+                  scheme = \"generalized_alpha\"\nrho_inf = 0.5\n";
     for degrees in [90.0_f64, 40.0, 15.0, 12.0, 8.0, 5.0] {
         // Below 10 degrees dynamic stages have nodes alone, which long elements hold too far from the crossing.
         let meshes = if degrees < 10.0 { &[[20, 20], [20, 21]][..] } else { &[[20, 20], [20, 21], [7, 10]] };
-        for elements in meshes {
+        for &elements in meshes {
             let [cosine, sine] = [degrees.to_radians().cos() * 0.5, degrees.to_radians().sin() * 0.5];
-            let deck = format!(
-                r#"
-[section.s]
-EA = 1e6
-GA = 1e4
-GJ = 1
-EI = 1
-rhoA = 0.1
-rhoJ = [1e-5, 5e-6, 5e-6]
-
-[[beam]]
-name = "upper"
-section = "s"
-through = [[-0.5, 0, 0], [0.5, 0, 0]]
-elements = {}
-
-[[beam]]
-name = "lower"
-section = "s"
-through = [[{}, {}, -0.02], [{cosine}, {sine}, -0.02]]
-elements = {}
-
-[[support]]
-at = "upper@start"
-fix = "all"
-
-[[support]]
-at = "upper@end"
-fix = "all"
-
-[[support]]
-at = "lower@start"
-fix = "all"
-
-[[support]]
-at = "lower@end"
-fix = "all"
-
-[[load]]
-along = "upper"
-force = [0, 0, -0.5]
-
-[[contact]]
-name = "k"
-beams = ["upper"]
-with = ["lower"]
-radius = 0.01
-damping = 0.1
-
-[[stage]]
-kind = "static"
-steps = 4
-
-[[stage]]
-kind = "dynamic"
-end = 0.05
-step = 1e-3
-scheme = "generalized_alpha"
-rho_inf = 0.5
-
-[output]
-nodes = ["upper@0.5"]
-columns = ["u", "contact", "energy"]
-"#,
-                elements[0], -cosine, -sine, elements[1]
-            );
-            let simulation = simulate(&deck);
+            let upper = bar([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], elements[0]);
+            let lower = bar([[-cosine, -sine, -0.02], [cosine, sine, -0.02]], elements[1]);
+            let simulation = simulate(&pressed([&upper, &lower], "damping = 0.1", stages));
             let normal = simulation.column("k.normal");
             let held = normal[4];
             let off = normal[5..].iter().map(|normal| (normal / held - 1.0).abs()).fold(0.0, f64::max);
@@ -768,65 +726,10 @@ columns = ["u", "contact", "energy"]
 /// A contact that begins to act in a later stage is looked at then.
 #[test]
 fn contacts_that_begin_inside_each_other_are_refused_in_any_stage() {
-    let deck = r#"
-[section.s]
-EA = 1e6
-GA = 1e4
-GJ = 1
-EI = 1
-
-[[beam]]
-name = "upper"
-section = "s"
-through = [[-0.5, 0, 0], [0.5, 0, 0]]
-elements = 4
-
-[[beam]]
-name = "lower"
-section = "s"
-through = [[0, -0.5, -0.02], [0, 0.5, -0.02]]
-elements = 4
-
-[[support]]
-at = "upper@start"
-fix = "all"
-
-[[support]]
-at = "upper@end"
-fix = "all"
-
-[[support]]
-at = "lower@start"
-fix = "all"
-
-[[support]]
-at = "lower@end"
-fix = "all"
-
-[[load]]
-along = "upper"
-force = [0, 0, -1]
-
-[[contact]]
-name = "k"
-beams = ["upper"]
-with = ["lower"]
-radius = 0.01
-stages = [2]
-
-[[stage]]
-kind = "static"
-steps = 1
-
-[[stage]]
-kind = "static"
-steps = 1
-
-[output]
-nodes = ["upper@0.5"]
-columns = ["u"]
-"#;
-    let failure = attempt(deck).result.unwrap_err();
+    let upper = bar([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], 4);
+    let lower = bar([[0.0, -0.5, -0.02], [0.0, 0.5, -0.02]], 4);
+    let stages = "[[stage]]\nkind = \"static\"\nsteps = 1\n".repeat(2);
+    let failure = attempt(&pressed([&upper, &lower], "stages = [2]", &stages)).result.unwrap_err();
     assert_eq!(failure.kind(), FailureKind::ContactStart, "{failure}");
     assert!(failure.to_string().contains("stage 2"), "{failure}");
 }
@@ -836,51 +739,18 @@ columns = ["u"]
 #[test]
 fn rods_that_hit_flush_rebound() {
     for (elements, shift) in [(4, 0.0), (10, 0.0), (11, 0.0), (10, 0.1)] {
-        let deck = format!(
-            r#"
-[section.s]
-EA = 1e6
-GA = 4e5
-GJ = 500
-EI = 500
-rhoA = 0.5
-rhoJ = [1e-4, 5e-5, 5e-5]
-
-[[beam]]
-name = "a"
-section = "s"
-through = [[-0.5, 0, 0], [0.5, 0, 0]]
-elements = {elements}
-
-[[beam]]
-name = "b"
-section = "s"
-through = [[{}, 0, 0.03], [{}, 0, 0.03]]
-elements = {elements}
-
-[[initial]]
-beam = "b"
-velocity = [0, 0, -2]
-
-[[contact]]
-name = "hit"
-beams = ["a"]
-with = ["b"]
-radius = 0.01
-
-[[stage]]
-kind = "dynamic"
-end = 0.02
-step = 1e-4
-
-[output]
-nodes = ["a@0.5", "b@0.5"]
-columns = ["v", "energy"]
-"#,
-            shift - 0.5,
-            shift + 0.5
-        );
-        let simulation = simulate(&deck);
+        let a = bar([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], elements);
+        let b = bar([[shift - 0.5, 0.0, 0.03], [shift + 0.5, 0.0, 0.03]], elements);
+        let deck = [
+            "[section.s]\nEA = 1e6\nGA = 4e5\nGJ = 500\nEI = 500\nrhoA = 0.5\nrhoJ = [1e-4, 5e-5, 5e-5]\n",
+            &a.deck("a"),
+            &b.deck("b"),
+            "[[initial]]\nbeam = \"b\"\nvelocity = [0, 0, -2]\n",
+            "[[contact]]\nname = \"hit\"\nbeams = [\"a\"]\nwith = [\"b\"]\nradius = 0.01\n",
+            "[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 1e-4\n",
+            "[output]\nnodes = [\"a@0.5\", \"b@0.5\"]\ncolumns = [\"v\", \"energy\"]\n",
+        ];
+        let simulation = simulate(&deck.concat());
         let [a, b] = ["a", "b"].map(|beam| simulation.end(&format!("{beam}@0.5.vz")));
         let energy = simulation.end("energy.total");
         println!("{elements} elements, shift {shift}: {a}, {b}, energy {energy}");
