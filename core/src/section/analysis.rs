@@ -18,10 +18,12 @@ pub const DEFAULT_AIM: f64 = 1e-3;
 /// Estimates above this deserve a warning
 pub const POOR_ESTIMATE: f64 = 1e-2;
 
-/// Refinement ends before meshes of more nodes where an aim is given: up to 20 s for laminates
+/// Refinement ends before meshes of more nodes where an aim is given. A laminate of 39,000 nodes takes
+/// ten seconds.
 const MAX_NODES: usize = 60_000;
 
-/// Refinement ends before meshes of more nodes where no aim is given: up to 3 s for laminates
+/// Refinement ends before meshes of more nodes where no aim is given. A laminate of 18,000 nodes takes
+/// two seconds.
 const MAX_NODES_UNASKED: usize = 20_000;
 
 /// Order of convergence that estimates count on. Smooth sections converge with order 4, corners
