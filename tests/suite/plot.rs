@@ -141,8 +141,6 @@ fn what_cannot_be_drawn_is_told() {
         (&["h.csv", "--reference", "empty.csv"], "empty.csv has no rows"),
         (&["nothing.csv"], "nothing.csv"),
         (&["h.csv", "--out", "h.pdf"], "unknown file type `.pdf`: plots are written as .svg or .png"),
-        #[cfg(not(feature = "png"))]
-        (&["h.csv", "--out", "h.png"], "--features png"),
     ] {
         let output = folder.beamsim(&[&["plot"], words].concat());
         assert!([2, 4].contains(&status(&output)) && last_line(&output).contains(told), "{}", last_line(&output));
@@ -153,6 +151,17 @@ fn what_cannot_be_drawn_is_told() {
     for name in ["one.csv", "still.csv"] {
         assert_eq!(status(&folder.beamsim(&["plot", name, "--out", "s.svg"])), 0);
         assert!(!fs::read_to_string(folder.0.join("s.svg")).unwrap().contains("NaN"));
+    }
+}
+
+#[test]
+fn a_plot_in_pixels_is_written_and_may_be_replaced() {
+    let folder = Folder::new("plot_pixels");
+    folder.write("h.csv", "stage,time,load,tip.uz\n1,0,0,0\n1,1,1,0.07\n");
+    for _ in 0..2 {
+        assert_eq!(status(&folder.beamsim(&["plot", "h.csv", "--out", "h.png"])), 0);
+        let png = fs::read(folder.0.join("h.png")).unwrap();
+        assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.ends_with(b"IEND\xae\x42\x60\x82"));
     }
 }
 
