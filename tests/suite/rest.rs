@@ -3,7 +3,7 @@
 use crate::random::Random;
 use crate::scenes::{attempt, simulate};
 use beamsim_core::rotation::Rotation;
-use beamsim_core::run::{Failure, Mode, Observer, Run, Snapshot, StabilityVerdict, StageResult};
+use beamsim_core::run::StabilityVerdict;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
 use std::f64::consts::PI;
@@ -244,32 +244,11 @@ fn a_chain_at_rest_swings_and_its_spins_are_exact_zeros() {
             .deck(frame, 0.3, false, 1)
             .replace("[[beam]]\nname = \"l0\"", &format!("{inertia}[[beam]]\nname = \"l0\""));
         let deck = deck.replace("[output]", "[[stage]]\nkind = \"modal\"\nmodes = 10\n[output]");
-        let mut recorder = Modes::default();
-        let (scene, _) = beamsim::scene::from_text(&deck).unwrap_or_else(|_| panic!("{deck}"));
-        let (result, _) = Run::new(scene.plan, &mut recorder).finish();
-        assert!(result.is_ok(), "{result:?}\n{deck}");
-        recorder.0
+        crate::modes::modes(&deck)
     };
     let (spinning, plain) = (modes("rhoJ = [2e-3, 1e-3, 1e-3]\n"), modes(""));
     assert!(spinning[..6].iter().all(|mode| mode.size() == 0.0), "{spinning:?}");
     for (with, without) in spinning[6..10].iter().zip(&plain) {
         assert!(with.growth == 0.0 && (with.omega / without.omega - 1.0).abs() < 0.02, "{spinning:?} {plain:?}");
-    }
-}
-
-/// The modes of the last modal stage.
-#[derive(Default)]
-struct Modes(Vec<Mode>);
-
-impl Observer for Modes {
-    fn row(&mut self, _snapshot: &Snapshot) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
-        if let StageResult::Modes(modes) = result {
-            self.0.clone_from(modes);
-        }
-        Ok(())
     }
 }

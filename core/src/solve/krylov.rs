@@ -7,7 +7,7 @@ use crate::interrupt;
 use crate::scalar::{Instructions, LANES, Lanes};
 use crate::sorting::sort_by;
 use crate::threads;
-use faer::linalg::solvers::{Eigen, SelfAdjointEigen};
+use faer::linalg::solvers::{Eigen, SelfAdjointEigen, Solve};
 use faer::{Mat, Side};
 use nalgebra::Complex;
 
@@ -21,6 +21,10 @@ pub trait Operator {
     fn weigh(&mut self, x: &[f64]) -> Vec<f64>;
     /// True if the operator is symmetric in the inner product
     fn is_symmetric(&self) -> bool;
+    /// Number of images after which a vector has no part left that the operator maps to zero
+    fn rounds(&self) -> usize {
+        1
+    }
 }
 
 /// Eigenvalues of an operator, of descending magnitude, with their eigenvectors.
@@ -52,6 +56,14 @@ const EIGENVALUE_TOLERANCE: f64 = 1e-11;
 /// Relative residual of an eigenvector at which it has converged where its eigenvalue only tells
 /// the sign of a growth
 const RESIDUAL_TOLERANCE: f64 = 1e-9;
+/// Relative residual of a vector of a projection that needs no mending
+const GOOD_VECTOR: f64 = 1e-9;
+/// Eigenvalues of a projection that differ by less, relative to them, are one multiple eigenvalue.
+const SAME_EIGENVALUE: f64 = 1e-7;
+/// The shift of inverse iteration beside an eigenvalue, relative to it
+const BESIDE_EIGENVALUE: f64 = 1e-12;
+/// Inverse iterations for a vector of a multiple eigenvalue
+const INVERSE_ITERATIONS: usize = 3;
 /// Vectors that orthogonalisation reduces to this part of their norm are linearly dependent on the
 /// basis.
 const DEPENDENT_NORM_RATIO: f64 = 1e-11;
@@ -148,7 +160,10 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
             && now.len() >= wanted.min(operator.size())
             && now.iter().zip(&last).take(guard).all(same);
         if still || !grows {
-            let pairs = space.pairs(operator.is_symmetric(), wanted)?;
+            let mut pairs = space.pairs(operator.is_symmetric(), wanted)?;
+            if !operator.is_symmetric() {
+                mend_vectors(&space.projection(), &mut pairs)?;
+            }
             return Some(Spectrum::of(pairs, space));
         }
         last = now;
@@ -286,10 +301,12 @@ impl KrylovSpace {
         let mut space = Self::default();
         let size = operator.size();
         for number in 0..block.min(size) {
-            let vector = start(size, number);
-            let weighed = operator.weigh(&vector);
-            let image = operator.apply(&vector, &weighed)?;
-            space.add(operator, image);
+            let mut vector = start(size, number);
+            for _ in 0..operator.rounds() {
+                let weighed = operator.weigh(&vector);
+                vector = operator.apply(&vector, &weighed)?;
+            }
+            space.add(operator, vector);
         }
         Some(space)
     }
@@ -435,6 +452,61 @@ fn eigenpairs(matrix: &Mat<f64>) -> Vec<Eigenpair> {
         }
         Err(_) => Vec::new(),
     }
+}
+
+/// Vectors of multiple eigenvalues, of which back substitution may give only one well: the others by
+/// inverse iteration, orthogonal to it. `None` after a request to stop.
+fn mend_vectors(projection: &Mat<f64>, pairs: &mut [Eigenpair]) -> Option<()> {
+    let size = projection.nrows();
+    for number in 0..pairs.len() {
+        let theta = pairs[number].0;
+        let is_same = |other: &Eigenpair| (other.0 - theta).norm() <= SAME_EIGENVALUE * theta.norm();
+        let is_multiple = pairs.iter().filter(|other| is_same(other)).count() > 1;
+        if theta.norm() == 0.0 || !is_multiple || left_over(projection, &pairs[number]) <= GOOD_VECTOR {
+            continue;
+        }
+        if interrupt::is_requested() {
+            return None;
+        }
+        let is_good = |other: &&Eigenpair| is_same(other) && left_over(projection, other) <= GOOD_VECTOR;
+        let mut others: Vec<Vec<Complex<f64>>> = Vec::new();
+        for (_, vector) in pairs.iter().filter(is_good) {
+            let mut vector = vector.clone();
+            take_out(&others, &mut vector);
+            others.push(vector);
+        }
+        let beside = theta * (1.0 + BESIDE_EIGENVALUE);
+        let shifted = Mat::from_fn(size, size, |i, j| {
+            Complex::from(projection[(i, j)]) - if i == j { beside } else { Complex::default() }
+        });
+        let factors = shifted.partial_piv_lu();
+        let mut vector: Vec<Complex<f64>> = start(size, number).into_iter().map(Complex::from).collect();
+        for _ in 0..INVERSE_ITERATIONS {
+            take_out(&others, &mut vector);
+            let solved = factors.solve(Mat::from_fn(size, 1, |i, _| vector[i]));
+            vector = (0..size).map(|i| solved[(i, 0)]).collect();
+        }
+        take_out(&others, &mut vector);
+        pairs[number].1 = vector;
+    }
+    Some(())
+}
+
+/// |P x - theta x| over |theta x|
+fn left_over(projection: &Mat<f64>, (theta, x): &Eigenpair) -> f64 {
+    let row = |i: usize| -> Complex<f64> { x.iter().enumerate().map(|(j, x)| x * projection[(i, j)]).sum() };
+    let left: f64 = (0..x.len()).map(|i| (row(i) - theta * x[i]).norm_sqr()).sum();
+    (left / x.iter().map(Complex::norm_sqr).sum::<f64>()).sqrt() / theta.norm()
+}
+
+/// Makes a vector orthogonal to orthonormal others, and its norm one.
+fn take_out(others: &[Vec<Complex<f64>>], x: &mut [Complex<f64>]) {
+    for other in others {
+        let along: Complex<f64> = other.iter().zip(&*x).map(|(other, x)| other.conj() * x).sum();
+        x.iter_mut().zip(other).for_each(|(x, other)| *x -= along * other);
+    }
+    let norm = x.iter().map(Complex::norm_sqr).sum::<f64>().sqrt();
+    x.iter_mut().for_each(|x| *x /= norm);
 }
 
 fn largest_first(a: &Complex<f64>, b: &Complex<f64>) -> std::cmp::Ordering {

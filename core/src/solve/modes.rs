@@ -5,7 +5,7 @@ use super::linear::LinearSolver;
 use super::pivots::is_symmetric;
 use super::softest::lost_part;
 use crate::interrupt;
-use crate::system::{Symmetry, System};
+use crate::system::{DofMap, Symmetry, System};
 use nalgebra::Complex;
 
 /// A rigid motion is linearly dependent on others if orthogonalisation reduces it to this part of
@@ -30,6 +30,9 @@ const INVERSE_ITERATIONS: usize = 3;
 
 /// Number of exponents of a rough estimate that are nearly right.
 const ROUGH_EXPONENTS: usize = 6;
+
+/// Eigenvalues of a rough estimate below this part of the largest are round-off.
+const SMALLEST_ROUGH_PART: f64 = 1e-15;
 
 /// Relative uncertainty of a frequency by round-off above which it is computed again from strains.
 const MAX_UNCERTAINTY: f64 = 1e-9;
@@ -114,6 +117,8 @@ pub struct ModeSearch<'a> {
     solver: &'a mut LinearSolver,
     matrices: &'a Matrices,
     form: ProblemForm,
+    /// Equations of multipliers
+    multipliers: Vec<usize>,
     /// Orthonormal rigid motions of free parts, and M times each; all vectors are orthogonal to
     /// them
     rigid: Vec<[Vec<f64>; 2]>,
@@ -186,11 +191,14 @@ impl<'a> ModeSearch<'a> {
         } else {
             ProblemForm::General
         };
+        let equations = solver.multipliers.iter().flat_map(|&slot| system.pattern.dof_map.of(slot));
+        let multipliers = equations.filter(|&k| k != DofMap::HELD).map(|k| k as usize).collect();
         let mut search = Self {
             system,
             solver,
             matrices,
             form,
+            multipliers,
             rigid: Vec::new(),
             shift: 0.0,
             is_ready: false,
@@ -220,8 +228,10 @@ impl<'a> ModeSearch<'a> {
         }
     }
 
-    /// Projects a vector onto the space orthogonal to the rigid motions.
+    /// Projects a vector onto the space orthogonal to the rigid motions, without multipliers: neither inertia
+    /// nor the energies of motions that keep the constraints depend on these, but round-off would.
     fn project(&self, x: &mut [f64]) {
+        self.multipliers.iter().for_each(|&k| x[k] = 0.0);
         for [motion, weighed] in &self.rigid {
             let along = dot(weighed, x);
             x.iter_mut().zip(motion).for_each(|(x, r)| *x -= along * r);
@@ -323,7 +333,9 @@ impl<'a> ModeSearch<'a> {
         let diagonal = self.inner_product();
         let values = roughly_largest_eigenvalues(&mut ModeOperator { search: self, diagonal })?;
         // Only the first few are nearly right.
-        let there = values.into_iter().filter(|theta| theta.norm() > 0.0).take(ROUGH_EXPONENTS);
+        let largest = values.iter().map(|theta| theta.norm()).fold(0.0, f64::max);
+        let is_there = |theta: &Complex<f64>| theta.norm() > SMALLEST_ROUGH_PART * largest;
+        let there = values.into_iter().filter(is_there).take(ROUGH_EXPONENTS);
         Some(there.map(|theta| form.exponent(shift, theta).norm()).collect())
     }
 
@@ -555,6 +567,11 @@ impl Operator for ModeOperator<'_, '_> {
 
     fn is_symmetric(&self) -> bool {
         self.search.form == ProblemForm::Symmetric
+    }
+
+    /// The velocities of the first image of a vector need not keep the constraints, those of the second do.
+    fn rounds(&self) -> usize {
+        if self.is_doubled() && !self.search.multipliers.is_empty() { 2 } else { 1 }
     }
 }
 
