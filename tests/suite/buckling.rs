@@ -1,7 +1,9 @@
 //! Critical loads on the paths of buckling stages: one row for each point.
 
+use crate::random::Random;
 use beamsim::scene;
 use beamsim_core::run::{CriticalKind, CriticalLoad, Failure, Observer, Run, Snapshot, StageResult};
+use beamsim_core::tensor::Vec3;
 use std::fs;
 use std::path::Path;
 
@@ -63,6 +65,37 @@ fn branches_before_a_limit_point_are_listed_with_it() {
     assert_eq!(*last, CriticalKind::Limit, "{found:?}");
     assert!(!before.is_empty() && before.iter().all(|kind| *kind == CriticalKind::Branch), "{found:?}");
     assert!(found.windows(2).all(|pair| pair[0].load < pair[1].load * (1.0 - 1e-6)), "{found:?}");
+}
+
+/// Next to the critical load round-off alone moves a column aside, the faster the nearer; it is a branch all the same.
+#[test]
+fn columns_in_any_direction_have_double_branches() {
+    let mut random = Random::new(43);
+    for case in 0..30 {
+        let length = 10f64.powf(random.range(-1.0, 2.0));
+        let along = random.direction();
+        let across = along.cross(random.direction()).normalized().unwrap();
+        let bending = 10f64.powf(random.range(-1.0, 2.0));
+        let stretching = bending / (length * length) * 10f64.powf(random.range(4.0, 7.0));
+        let vector = |v: Vec3| format!("[{}, {}, {}]", v.0[0], v.0[1], v.0[2]);
+        let exact = std::f64::consts::PI.powi(2) / 4.0 * bending / (length * length);
+        let text = format!(
+            "[point]\na = [0, 0, 0]\nb = {}\n[section.s]\nEA = {stretching}\nGA = {}\nGJ = {bending}\nEI = {bending}\n\
+             [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 12\norder = 2\naxis3 = {}\n\
+             [[support]]\nat = \"a\"\nfix = \"all\"\n[[load]]\nat = \"b\"\nforce = {}\n[[stage]]\nkind = \"static\"\nsteps = 1\n\
+             [[stage]]\nkind = \"buckling\"\nmodes = 2\n",
+            vector(along * length),
+            stretching * 100.0,
+            vector(across),
+            vector(along * (-0.5 * exact)),
+        );
+        let found = critical_loads(&text);
+        let [one, other] = found[..] else { panic!("{case}: {found:?}\n{text}") };
+        for critical in [one, other] {
+            assert_eq!(critical.kind, CriticalKind::Branch, "{case}: {found:?}\n{text}");
+            assert!((critical.load / 2.0 - 1.0).abs() < 1e-3, "{case}: {found:?}\n{text}");
+        }
+    }
 }
 
 /// Two modes at one load are two rows.

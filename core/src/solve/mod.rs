@@ -29,6 +29,7 @@ pub use general::GeneralSolver;
 pub use krylov::{Operator, Spectrum, largest_eigenvalues};
 pub use linear::{Factorisation, LinearSolver};
 pub use modes::{MIN_GROWTH_RATIO, Matrices, ModeSearch, ModeShape, SmallMotion};
+pub(crate) use newton::SMALLEST_COMPARED_CORRECTION;
 pub use newton::{Newton, NewtonMemory};
 pub use newton_failure::NewtonFailure;
 pub use pivots::is_symmetric;

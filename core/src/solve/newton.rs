@@ -64,7 +64,7 @@ pub struct NewtonMemory {
 
 /// Corrections below this size (relative to the length of the scene, or in radians) do not count
 /// for the contraction.
-const SMALLEST_COMPARED_CORRECTION: f64 = 1e-6;
+pub(crate) const SMALLEST_COMPARED_CORRECTION: f64 = 1e-6;
 
 /// Corrections above this size (relative to the length of the scene, or in radians) show
 /// divergence.

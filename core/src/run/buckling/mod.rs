@@ -16,7 +16,6 @@ use super::distance::distance;
 use super::failure::Failure;
 use super::results::{CriticalKind, CriticalLoad, StageResult};
 use super::stage_run::{Analysis, StageRun};
-use super::statics::PathDirection;
 use crate::sorting::sort_by;
 use crate::system::State;
 use crate::warning::WarningKind;
@@ -29,6 +28,9 @@ const NEAR: f64 = 1e-4;
 /// The motion by a unit of load just before a limit point, over that at the start: the root of one
 /// over the part of a load to which it is closed in.
 const RUNS_AWAY: f64 = 50.0;
+/// The same for the work that loads do on the motion. Next to a bifurcation, round-off alone moves a scene
+/// along the buckling mode, on which they do none.
+const WORK_RUNS_AWAY: f64 = 2.0;
 /// The way, over a load, that a path goes on behind it where it has no limit point there.
 const BEHIND: f64 = 1e-4;
 /// The part of a load to which the tangent next to it must foresee it: then it is critical for all
@@ -65,6 +67,14 @@ impl Found {
     fn on_the_way(load: f64, kind: CriticalKind) -> Self {
         Self { critical: CriticalLoad { load, kind }, ends_path: false }
     }
+}
+
+/// How a scene answers to a unit of load.
+struct Response {
+    /// How far it moves, in lengths of the scene and radians
+    size: f64,
+    /// The work of the loads on that motion; `None` without loads
+    work: Option<f64>,
 }
 
 /// The limit of a path above the present load, or below it.
@@ -176,7 +186,7 @@ impl Buckling<'_, '_> {
     /// Every attempt starts from the last point before it, since behind it the way back is not sure
     /// to be the same. `done` tells the part of the stage that lies behind with some part of this.
     fn follow(&mut self, estimate: f64, before: usize, done: &dyn Fn(f64) -> f64) -> Result<Found, Failure> {
-        let start_rate = self.size_of_rate()?;
+        let at_start = self.response()?;
         let none = negative_pivots(self.stage);
         let mut search = CriticalSearch::new(self.stage.state.clone(), estimate);
         for _ in 0..MOST_LOOKS {
@@ -195,7 +205,7 @@ impl Buckling<'_, '_> {
                 if search.is_a_limit(found) && !search.behind.as_ref().is_some_and(is_apart) {
                     self.stage.state.copy_from(&search.here);
                     self.stage.judge_mesh()?;
-                    let kind = self.kind_of_critical(start_rate)?;
+                    let kind = self.kind_of_critical(&at_start)?;
                     let ends_path = kind == CriticalKind::Limit && search.ended.is_some();
                     return Ok(Found { critical: CriticalLoad { load: found, kind }, ends_path });
                 }
@@ -256,16 +266,20 @@ impl Buckling<'_, '_> {
 
     /// The kind of the critical load just ahead of the present state: towards a limit point the
     /// path moves without bounds.
-    fn kind_of_critical(&mut self, start_rate: f64) -> Result<CriticalKind, Failure> {
-        let runs_away = self.size_of_rate()? > RUNS_AWAY * start_rate;
+    fn kind_of_critical(&mut self, at_start: &Response) -> Result<CriticalKind, Failure> {
+        let here = self.response()?;
+        let works = here.work.zip(at_start.work).is_none_or(|(now, first)| now.abs() > WORK_RUNS_AWAY * first.abs());
+        let runs_away = here.size > RUNS_AWAY * at_start.size && works;
         Ok(if runs_away { CriticalKind::Limit } else { CriticalKind::Branch })
     }
 
-    /// How far a unit of load moves the scene at the present state, in lengths of it and radians.
-    fn size_of_rate(&mut self) -> Result<f64, Failure> {
-        let Some(PathDirection { rate, .. }) = self.stage.path_direction()? else { return Ok(0.0) };
-        let sizes = rate.iter().zip(self.stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
-        Ok(sizes.map(|(rate, kind)| rate.norm() / kind.scale(self.stage.model.length)).fold(0.0, f64::max))
+    /// How a unit of load moves the scene at the present state.
+    fn response(&mut self) -> Result<Response, Failure> {
+        let Some(direction) = self.stage.path_direction()? else { return Ok(Response { size: 0.0, work: None }) };
+        let model = &self.stage.model;
+        let sizes = direction.rate.iter().zip(model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
+        let size = sizes.map(|(rate, kind)| rate.norm() / kind.scale(model.length)).fold(0.0, f64::max);
+        Ok(Response { size, work: direction.work_rate(model) })
     }
 
     /// A structure that an imperfection lets turn aside has no critical point. From smaller loads

@@ -26,6 +26,15 @@ impl PathDirection {
     pub fn none(slots: usize) -> Self {
         Self { rate: vec![Vec3::ZERO; slots], pull: vec![Vec3::ZERO; slots] }
     }
+
+    /// The rate of the displacement that the loads do work on; `None` without loads. What stands at
+    /// multipliers are gaps of motors, not forces.
+    pub fn work_rate(&self, model: &Model) -> Option<f64> {
+        let all = self.pull.iter().zip(&self.rate).zip(model.kinds.iter());
+        let acting = || all.clone().filter(|(_, kind)| !kind.is_multiplier());
+        let loaded = acting().any(|((force, _), _)| *force != Vec3::ZERO);
+        loaded.then(|| acting().map(|((force, rate), _)| -force.dot(*rate)).sum())
+    }
 }
 
 impl StageRun<'_> {

@@ -13,11 +13,12 @@
 
 use super::load_control::PathDirection;
 use super::path_point::{Path, PathPoint};
+use super::stability::LARGEST_CONTRACTION;
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
-use crate::solve::{self, Judgement, NewtonFailure, Tangent, Verdict, mechanism, timed};
+use crate::solve::{self, Judgement, NewtonFailure, SMALLEST_COMPARED_CORRECTION, Tangent, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -135,18 +136,19 @@ impl Path {
     /// The point at the run's state: its tangent goes on in the direction of `before`.
     fn look(&mut self, stage: &mut StageRun, before: &PathPoint) -> Result<PathPoint, Failure> {
         let slots = stage.state.q.len();
-        let PathDirection { rate, pull } = stage.path_direction()?.unwrap_or_else(|| PathDirection::none(slots));
+        let direction = stage.path_direction()?.unwrap_or_else(|| PathDirection::none(slots));
         // The tangent of the last evaluation tells the pivots.
         let StageRun { assembly, newton, .. } = stage;
         let mut tangent = Tangent::that_may_go(assembly, stage.state, Weights::STIFFNESS);
         let signature = newton.solver.signature(&mut tangent);
         stage.unless_interrupted()?;
-        let along = dot(stage, &rate, &before.tangent) * self.scale + before.load_rate;
-        let size = (squared(stage, &rate) * self.scale + 1.0).sqrt();
+        let rate = &direction.rate;
+        let along = dot(stage, rate, &before.tangent) * self.scale + before.load_rate;
+        let size = (squared(stage, rate) * self.scale + 1.0).sqrt();
         let load_rate = if along < 0.0 { -1.0 / size } else { 1.0 / size };
         // Of prescribed motions alone no displacement is known that loads would do work on.
-        let work = work_of_loads(stage, &pull, &rate).unwrap_or(load_rate.signum());
-        let tangent = rate.into_iter().map(|d| d * load_rate).collect();
+        let work = direction.work_rate(stage.model).unwrap_or(load_rate.signum());
+        let tangent = direction.rate.into_iter().map(|d| d * load_rate).collect();
         Ok(PathPoint {
             state: stage.state.clone(),
             tangent,
@@ -162,7 +164,7 @@ impl Path {
         loop {
             let length = self.length;
             let failure = match self.advance(stage, length) {
-                Ok(iterations) => {
+                Ok(Corrected { iterations, contraction }) => {
                     let next = match self.look(stage, &self.here.clone()) {
                         Ok(next) => next,
                         Err(failure) => {
@@ -173,7 +175,9 @@ impl Path {
                     let cosine = dot(stage, &next.tangent, &self.here.tangent) * self.scale
                         + next.load_rate * self.here.load_rate;
                     let straight = cosine.min(length / self.chord(stage, &next)) >= MIN_COSINE;
-                    let fine = straight && !self.may_have_jumped(&next, length);
+                    let has_strayed = self.may_have_jumped(&next, length)
+                        || (contraction > LARGEST_CONTRACTION && length > BELIEVED * self.first);
+                    let fine = straight && !has_strayed;
                     if fine || length <= SHORTEST * self.first {
                         let factor = (EASY / iterations.max(1) as f64).sqrt().clamp(0.5, 2.0);
                         let is_easy = iterations <= 2 && cosine >= STRAIGHT;
@@ -228,13 +232,14 @@ impl Path {
     }
 
     /// Goes `length` along the tangent and back to the path; leaves the run's state there and
-    /// returns the iterations.
-    fn advance(&self, stage: &mut StageRun, length: f64) -> Result<usize, NewtonFailure> {
+    /// returns how the corrections went.
+    fn advance(&self, stage: &mut StageRun, length: f64) -> Result<Corrected, NewtonFailure> {
         let mut load = self.predict(stage, length);
         stage.assembly.forget();
         let round_off = stage.assembly.round_off(stage.state);
-        let mut last = None;
-        let (mut iterations, mut history) = (0, Vec::new());
+        let mut last: Option<f64> = None;
+        let mut done = Corrected { iterations: 0, contraction: 0.0 };
+        let mut history = Vec::new();
         loop {
             NewtonFailure::unless_interrupted()?;
             // Held directions are put where they belong, free of the round-off of predictor and
@@ -251,10 +256,10 @@ impl Path {
             match verdict {
                 Verdict::Converged | Verdict::Noisy => {
                     stage.refuse_departures()?;
-                    return Ok(iterations);
+                    return Ok(done);
                 }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, stage.state)),
-                Verdict::Continue if iterations == newton.max_iterations => {
+                Verdict::Continue if done.iterations == newton.max_iterations => {
                     return Err(NewtonFailure::NotConverged { residual, history });
                 }
                 Verdict::Continue => {}
@@ -265,10 +270,14 @@ impl Path {
                 return Err(NewtonFailure::NotConverged { residual, history });
             }
             load += dl;
+            let size = solve::size(stage.model, &dq);
+            if let Some(last) = last.filter(|&last| last > SMALLEST_COMPARED_CORRECTION) {
+                done.contraction = done.contraction.max(size / last);
+            }
             let switched = correct(stage, &dq);
             // What was a correction before is none in a new chart.
-            last = Some(if switched { f64::INFINITY } else { solve::size(stage.model, &dq) });
-            iterations += 1;
+            last = Some(if switched { f64::INFINITY } else { size });
+            done.iterations += 1;
         }
     }
 
@@ -369,6 +378,13 @@ impl Path {
     }
 }
 
+/// How the corrections of a step went.
+struct Corrected {
+    iterations: usize,
+    /// The largest correction over the one before it: on the way back to the path corrections shrink
+    contraction: f64,
+}
+
 /// A length along the tangent, and the value that is looked for there.
 #[derive(Clone, Copy)]
 struct Bracket {
@@ -387,14 +403,6 @@ fn correct(stage: &mut StageRun, dq: &[Vec3]) -> bool {
         charts::freeze(stage.state, &stage.charted.elements);
     }
     switched > 0
-}
-
-/// The rate of the displacement that the loads do work on; `None` without loads. What stands at
-/// multipliers are gaps of motors, not forces.
-fn work_of_loads(stage: &StageRun, pull: &[Vec3], rate: &[Vec3]) -> Option<f64> {
-    let acting = || pull.iter().zip(rate).zip(stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
-    let loaded = acting().any(|((force, _), _)| *force != Vec3::ZERO);
-    loaded.then(|| acting().map(|((force, d), _)| -force.dot(*d)).sum())
 }
 
 /// The sum over displacements of squares; rotations follow.
