@@ -3,12 +3,12 @@
 mod assembled;
 mod bad_decks;
 mod beam_contacts;
-
 mod buckling;
 mod builder;
 mod coefficients;
 mod command;
 mod constraints;
+mod contact_jumps;
 mod contacts;
 mod convergence;
 mod corners;
@@ -31,6 +31,7 @@ mod linear_stages;
 mod masses;
 mod mechanics;
 mod mechanisms;
+mod modes;
 mod pair_friction;
 mod placed;
 mod planar;

@@ -26,6 +26,10 @@ pub trait Contacts {
     /// state.
     fn hold(&self, at: &mut State);
 
+    /// Begins the multipliers of static, modal and buckling stages, after a dynamic one, with the forces of the
+    /// penalty.
+    fn begin_augmented(&self, at: &mut State);
+
     /// Begins the penalty of dynamic stages, after a static one, with the forces of the multipliers.
     fn begin_penalty(&self, at: &mut State);
 

@@ -130,7 +130,7 @@ impl<'o> Run<'o> {
             if state.contacts.regime != regime {
                 match regime {
                     ContactRegime::Penalty => contacts.begin_penalty(state),
-                    ContactRegime::Augmented => state.contacts.regime = regime,
+                    ContactRegime::Augmented => contacts.begin_augmented(state),
                 }
             }
             if stage.work.kind() == StageKind::Modal {

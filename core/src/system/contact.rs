@@ -108,20 +108,24 @@ pub struct PointMemory {
     /// The number of the edge of a box or a mesh that it touches; otherwise it touches the whole
     /// surface
     pub(crate) edge: Option<u32>,
-    /// p, the normal force
+    /// The part of the force and of the traction that it carries: all of it in static stages, and the
+    /// part of its share where points of a dynamic stage share them
+    pub(crate) weight: f64,
+    /// p, the normal force, without the weight
     pub(crate) force: f64,
     /// L of the next evaluation in static stages, with which the force of an accepted state is p
     pub(crate) multiplier: f64,
     /// g, the gap, a length
     pub(crate) gap: f64,
-    /// Its friction at the last converged state, in the axes of the surface; of beams in global axes
+    /// Its friction at the last converged state, without the weight, in the axes of the surface; of beams in
+    /// global axes
     pub(crate) carried: CarriedTraction,
     /// The gap at which the penalty begins, a length: a dynamic stage begins with the forces of the
     /// static one before
     pub(crate) offset: f64,
     /// The number of steps of a dynamic stage in contact
     pub(crate) steps: u32,
-    /// The force on the beam or body (global components)
+    /// The force on the beam or body, with the weight (global components)
     pub(crate) push: Vec3,
     /// The place where bodies touch (global components)
     pub(crate) at: Vec3,
@@ -131,6 +135,21 @@ impl PointMemory {
     /// True if it has a traction and did not slide.
     pub fn sticks(&self) -> bool {
         self.carried.force != Vec3::ZERO && !self.carried.slides
+    }
+
+    /// Gives the point another part of the force, which stays the same with it.
+    pub fn share(&mut self, weight: f64) {
+        let factor = self.weight / weight;
+        self.weight = weight;
+        self.force *= factor;
+        self.multiplier *= factor;
+        self.carried.force = self.carried.force * factor;
+    }
+
+    /// The gap at which the penalty of a point begins that carries the part `weight` now, a length: one whose
+    /// share grows pushes no more by its offset than before.
+    pub fn offset_at(&self, weight: f64) -> f64 {
+        self.offset * (self.weight / weight).min(1.0)
     }
 
     /// A point that is open now, with the traction of the last converged state; `None` if it had none.
@@ -188,9 +207,6 @@ pub struct PairPointMemory {
     /// Its place on the second beam: the number of its element plus the part of that element before
     /// it
     pub(crate) on_second: f64,
-    /// The part of the force that it carries
-    pub(crate) weight: f64,
-    /// Its place on the first beam; its force and its traction (global axes) without the weight, and
-    /// the push on the first beam with it
+    /// Its place on the first beam, its force and its traction (global axes), and the push on the first beam
     pub(crate) point: PointMemory,
 }

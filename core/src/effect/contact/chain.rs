@@ -1,7 +1,9 @@
 //! A beam or a body against one surface: its nodes, and its candidates for contact.
 //!
 //! The candidates of a state are the closest points between the ends of elements
-//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. At boxes and meshes the
+//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one; in dynamic stages
+//! closest points and the nodes beside them share the force, so that it does not jump where a closest
+//! point passes from one element to the next. At boxes and meshes the
 //! closest points to edges are candidates as well ([`crate::kernel::contact::edge`]). Elements from
 //! which the surface is farther than they reach have none: the distance changes by no more than a
 //! point moves.
@@ -10,11 +12,9 @@ use super::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
 use super::strand::{ChainNode, Strand};
 use super::surface::SceneSurface;
 use crate::kernel::MAX_NODES;
-use crate::kernel::contact::along::{slopes, weighted_sum};
-use crate::kernel::contact::{
-    Carrier, Distance, Edge, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima,
-};
-use crate::system::{ChainMemory, PointMemory, State};
+use crate::kernel::contact::along::weighted_sum;
+use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
+use crate::system::{ChainMemory, ContactRegime, PointMemory, State};
 use crate::tensor::Vec3;
 use std::ops::Deref;
 
@@ -24,6 +24,9 @@ pub(super) const REACH: [f64; MAX_NODES + 1] = [1.0, 1.0, 1.0, 1.25, 1.64];
 
 /// Gaps below this part of the radius are looked at.
 const MARGIN: f64 = 1e-5;
+
+/// Places along a chain, counted in nodes, differ by less than this where they are equal.
+const ROUNDED_PLACE: f64 = 1e-9;
 
 /// Beams without end caps touch with the rim of their end: the surface is nearest beside the end,
 /// not beyond it, if the cosine between its direction and the beam is below this.
@@ -58,6 +61,8 @@ pub(super) struct Candidate {
     /// The number of the edge of a box or a mesh that it may touch; otherwise it may touch the whole
     /// surface
     pub(super) edge: Option<u32>,
+    /// The part of the force that it carries
+    pub(super) weight: f64,
 }
 
 impl Candidate {
@@ -85,6 +90,7 @@ struct SeenChain<'a> {
     free: (Vec3, f64),
     /// Points of the chain with a force at the last look
     points: &'a [PointMemory],
+    regime: ContactRegime,
 }
 
 impl Chain {
@@ -100,7 +106,8 @@ impl Chain {
         let places = self.seen(carrier, at);
         let gap = |place: Vec3| surface.value(place, self.radius).map_or(f64::INFINITY, |value| value - self.radius);
         let nodes = places.iter().map(|place| gap(*place)).fold(f64::INFINITY, f64::min);
-        let seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points: &[] };
+        let regime = ContactRegime::Augmented;
+        let seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points: &[], regime };
         let elements = 0..if self.order == 0 { 0 } else { self.elements() };
         elements.flat_map(|k| seen.closest(k)).map(gap).fold(nodes, f64::min)
     }
@@ -138,7 +145,8 @@ impl Chain {
     ) -> Vec<Candidate> {
         let places = self.seen(carrier, at);
         let points = memory.map_or(&[][..], |memory| &memory.points);
-        SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points }.candidates()
+        let regime = at.contacts.regime;
+        SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points, regime }.candidates()
     }
 
     /// True if the surface is farther from the middle node than the chain reaches: no point of it has
@@ -168,21 +176,28 @@ impl Chain {
             for (own, point) in (first..).zip(points[first..].iter().take_while(may_be_near)) {
                 let shift = self.shift(point.place, along);
                 if shift <= LARGEST_SHIFT {
-                    let relation = relation(point.edge, candidate.edge);
+                    let relation = self.relation(point, candidate);
                     links.push(Link { candidate: number, point: own, relation, shift });
                 }
             }
         }
         Predecessors::of(links, candidates.len(), points.len())
     }
-}
 
-/// The relation of two points by the edges that they touch.
-fn relation(before: Option<u32>, now: Option<u32>) -> Relation {
-    match (before, now) {
-        (before, now) if before == now => Relation::Same,
-        (Some(_), Some(_)) => Relation::OtherEdge,
-        _ => Relation::OtherFeature,
+    /// The relation of a point in memory and a candidate, by what they touch and what they are: both at the
+    /// same node, or both between nodes.
+    fn relation(&self, before: &PointMemory, now: &Candidate) -> Relation {
+        let in_nodes = |along: f64| along * self.order as f64;
+        let is_node = |along: f64| (in_nodes(along) - in_nodes(along).round()).abs() < ROUNDED_PLACE;
+        let are_alike = match (is_node(before.place), is_node(now.along())) {
+            (true, true) => self.shift(before.place, now.along()) < ROUNDED_PLACE,
+            (before, now) => before == now,
+        };
+        match (before.edge, now.edge) {
+            (before, now) if before == now && are_alike => Relation::Same,
+            (Some(_), Some(_)) => Relation::OtherEdge,
+            _ => Relation::OtherFeature,
+        }
     }
 }
 
@@ -194,14 +209,14 @@ impl SeenChain<'_> {
             is_near[k] = true;
         }
         let mut candidates = Vec::new();
-        let mut has_minimum = vec![false; count];
         for k in 0..count {
             is_near[k] = is_near[k] || !self.is_free(k);
             if is_near[k] {
-                has_minimum[k] = self.add_minima(k, &mut candidates);
+                self.add_minima(k, &mut candidates);
             }
         }
-        self.add_nodes(&is_near, &has_minimum, &mut candidates);
+        self.add_nodes(&is_near, &mut candidates);
+        candidates.retain(|candidate| candidate.weight > 0.0);
         candidates.sort_by(|a, b| a.along().total_cmp(&b.along()));
         candidates
     }
@@ -261,6 +276,49 @@ impl SeenChain<'_> {
         }
     }
 
+    /// The derivative of the place on element `k` over s.
+    fn tangent(&self, k: usize, s: f64) -> Vec3 {
+        match self.places_of(k) {
+            [a, b] => weighted_sum(&ShapeAt::<2>::new(s).slopes, |i| [*a, *b][i]),
+            [a, b, c] => weighted_sum(&ShapeAt::<3>::new(s).slopes, |i| [*a, *b, *c][i]),
+            [a, b, c, d, ..] => weighted_sum(&ShapeAt::<4>::new(s).slopes, |i| [*a, *b, *c, *d][i]),
+            [_] | [] => Vec3::ZERO,
+        }
+    }
+
+    /// The element beyond an end of element `k`, 0 or 1.
+    fn neighbour(&self, k: usize, end: f64) -> Option<usize> {
+        let count = self.chain.elements();
+        let is_last = k == if end == 1.0 { count - 1 } else { 0 };
+        let step = if end == 1.0 { 1 } else { count - 1 };
+        (!is_last || self.chain.is_closed()).then(|| (k + step) % count)
+    }
+
+    /// The part of a force that the closest point of element `k` carries. At the inside of a kink, the
+    /// elements on both sides have closest points, of which one comes or goes at the kink, where the other
+    /// one has a force. In a dynamic stage its part fades towards the kink.
+    fn share(&self, k: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> f64 {
+        match self.regime {
+            ContactRegime::Augmented => 1.0,
+            ContactRegime::Penalty => self.share_at(k, 0.0, distance).min(self.share_at(k, 1.0, distance)),
+        }
+    }
+
+    /// The part of a force that the kink at an end of element `k`, 0 or 1, leaves to it. With the rises a and
+    /// b of the distance per length towards the kink, on this element and on the one beyond: a/(a + b), and 1 where
+    /// the distance falls.
+    fn share_at(&self, k: usize, end: f64, distance: &dyn Fn(Vec3) -> Option<Distance>) -> f64 {
+        let rise = |element: usize, end: f64| {
+            let outward = self.tangent(element, end).normalized()? * (2.0 * end - 1.0);
+            Some(distance(self.place(element, end))?.normal.dot(outward))
+        };
+        let rises = self.neighbour(k, end).and_then(|beyond| Some([rise(k, end)?, rise(beyond, 1.0 - end)?]));
+        match rises {
+            Some([own, beyond]) if own >= 0.0 && beyond > 0.0 => own / (own + beyond),
+            Some(_) | None => 1.0,
+        }
+    }
+
     /// The places of all closest points between the ends of element `k`.
     fn closest(&self, k: usize) -> Vec<Vec3> {
         let of_surface = self.minima(k, &|y| self.surface.distance(y).ok());
@@ -268,16 +326,15 @@ impl SeenChain<'_> {
         of_surface.found().iter().map(|minimum| minimum.s).chain(of_edges).map(|s| self.place(k, s)).collect()
     }
 
-    /// Adds the closest points between the ends of element `k`; true if some of them carry the
-    /// force of the element. The edge of a body that has come inside the section pushes it out, too,
+    /// Adds the closest points between the ends of element `k`. The edge of a body that has come inside the section pushes it out, too,
     /// from the place where it is.
-    fn add_minima(&self, k: usize, candidates: &mut Vec<Candidate>) -> bool {
+    fn add_minima(&self, k: usize, candidates: &mut Vec<Candidate>) {
         // The node of a body touches edges and corners by its distance from the whole surface.
         if self.chain.order == 0 {
-            return false;
+            return;
         }
-        let mut is_sharp = false;
-        for &Minimum { s, kind } in self.minima(k, &|y| self.surface.distance(y).ok()).found() {
+        let distance = |y: Vec3| self.surface.distance(y).ok();
+        for &Minimum { s, kind } in self.minima(k, &distance).found() {
             let place = match kind {
                 MinimumKind::Sharp => Place::Closest,
                 MinimumKind::Kink if self.surface.side == Side::Outside => Place::Fixed,
@@ -287,11 +344,13 @@ impl SeenChain<'_> {
             if place == Place::Closest && self.surface.has_edges() {
                 continue;
             }
-            is_sharp |= place == Place::Closest;
-            candidates.push(Candidate { element: k, s, place, edge: None });
+            let weight = match place {
+                Place::Closest => self.share(k, &distance),
+                Place::Fixed => 1.0,
+            };
+            candidates.push(Candidate { element: k, s, place, edge: None, weight });
         }
         candidates.extend(self.closest_to_edges(k));
-        is_sharp
     }
 
     /// Numbers of the edges that element `k` may touch: those that are near, and those that it touched
@@ -324,49 +383,46 @@ impl SeenChain<'_> {
                 let place = self.place(k, s);
                 edge.is_beside(place) && self.surface.owns_corner(number, place)
             };
-            let at = |s: f64, place: Place| Candidate { element: k, s, place, edge: Some(number) };
-            let minima = self.minima(k, &|y| edge.distance(y).ok());
+            let at = |s: f64, place: Place, weight: f64| Candidate { element: k, s, place, edge: Some(number), weight };
+            let distance = |y: Vec3| edge.distance(y).ok();
+            let minima = self.minima(k, &distance);
             let smooth = minima.found().iter().filter(|minimum| minimum.kind != MinimumKind::Kink);
-            found.extend(smooth.filter(|minimum| is_beside(minimum.s)).map(|minimum| at(minimum.s, Place::Closest)));
-            let falls = |k: usize, s: f64| self.slope(k, s, &edge).is_some_and(|slope| slope < 0.0);
-            let count = self.chain.elements();
-            let is_closed = self.chain.is_closed();
-            let is_last = k + 1 == count && !is_closed;
-            let is_first = k == 0 && !is_closed;
-            if (is_first || falls((k + count - 1) % count, 1.0)) && !falls(k, 0.0) && is_beside(0.0) {
-                found.push(at(0.0, Place::Fixed));
+            let beside = smooth.filter(|minimum| is_beside(minimum.s));
+            found.extend(beside.map(|minimum| at(minimum.s, Place::Closest, self.share(k, &distance))));
+            let falls = |k: usize, s: f64| {
+                distance(self.place(k, s)).is_some_and(|distance| distance.normal.dot(self.tangent(k, s)) < 0.0)
+            };
+            if self.neighbour(k, 0.0).is_none_or(|before| falls(before, 1.0)) && !falls(k, 0.0) && is_beside(0.0) {
+                found.push(at(0.0, Place::Fixed, 1.0));
             }
-            if is_last && falls(k, 1.0) && is_beside(1.0) {
-                found.push(at(1.0, Place::Fixed));
+            if self.neighbour(k, 1.0).is_none() && falls(k, 1.0) && is_beside(1.0) {
+                found.push(at(1.0, Place::Fixed, 1.0));
             }
         }
         found
     }
 
-    /// The slope over s of the distance of a point of element `k` from an edge.
-    fn slope(&self, k: usize, s: f64, edge: &Edge) -> Option<f64> {
-        let distance = edge.distance(self.place(k, s)).ok()?;
-        let slopes = match self.places_of(k) {
-            [a, b] => slopes(&[*a, *b], &ShapeAt::new(s), &distance),
-            [a, b, c] => slopes(&[*a, *b, *c], &ShapeAt::new(s), &distance),
-            [a, b, c, d] => slopes(&[*a, *b, *c, *d], &ShapeAt::new(s), &distance),
-            _ => return None,
-        };
-        Some(slopes.first)
-    }
-
-    /// Adds the nodes of near elements that are not beside a closest point.
-    fn add_nodes(&self, is_near: &[bool], has_minimum: &[bool], candidates: &mut Vec<Candidate>) {
+    /// Adds the nodes of near elements with the part of the force that closest points beside them leave.
+    fn add_nodes(&self, is_near: &[bool], candidates: &mut Vec<Candidate>) {
         let order = self.chain.order;
         let last = self.places.len() - 1;
+        let mut left = vec![1.0; last + 1];
+        let of_surface = |candidate: &&Candidate| candidate.place == Place::Closest && candidate.edge.is_none();
+        for closest in candidates.iter().filter(of_surface) {
+            for i in 0..=order {
+                left[closest.element * order + i] *= self.left_by(closest, i as f64 / order as f64);
+            }
+        }
+        let is_closed = self.chain.is_closed();
+        if is_closed {
+            left[0] *= left[last];
+        }
         for k in 0..=last {
             // A body alone has no elements, and counts as one.
             let from = k.saturating_sub(1).checked_div(order).unwrap_or(0);
             let to = k.checked_div(order).map_or(0, |element| element.min(is_near.len() - 1));
-            let is_closed = self.chain.is_closed();
             let across = (is_closed && k == 0).then_some(is_near.len() - 1);
-            let beside = (from..=to).chain(across);
-            let is_candidate = beside.clone().any(|e| is_near[e]) && !beside.clone().any(|e| has_minimum[e]);
+            let is_candidate = (from..=to).chain(across).any(|element| is_near[element]);
             // The last node of a ring is the first one.
             if !is_candidate || (is_closed && k == last) {
                 continue;
@@ -375,7 +431,16 @@ impl SeenChain<'_> {
                 continue;
             }
             let s = if order == 0 { 0.0 } else { (k - to * order) as f64 / order as f64 };
-            candidates.push(Candidate { element: to, s, place: Place::Fixed, edge: None });
+            candidates.push(Candidate { element: to, s, place: Place::Fixed, edge: None, weight: left[k] });
+        }
+    }
+
+    /// The part of a force that a closest point leaves to a node of its element at `s`: in a dynamic stage the
+    /// more, the farther they are apart.
+    fn left_by(&self, closest: &Candidate, s: f64) -> f64 {
+        match self.regime {
+            ContactRegime::Augmented => 0.0,
+            ContactRegime::Penalty => 1.0 - closest.weight * (1.0 - (closest.s - s).abs()),
         }
     }
 

@@ -123,13 +123,15 @@ impl<'a> ChainNow<'a> {
     fn law(&self, candidate: &Candidate, predecessors: &Predecessors, partner: Option<&PointMemory>) -> ContactLaw {
         let contacts = &self.at.contacts;
         let stiffness = self.chain.stiffness[candidate.element];
-        let [multiplier, offset] = partner.map_or([0.0; 2], |point| [point.multiplier, point.offset]);
+        let multiplier = partner.map_or(0.0, |point| point.multiplier);
+        let offset = partner.map_or(0.0, |point| point.offset_at(candidate.weight));
         let normal = self.laws.normal_law(multiplier, offset, &stiffness, contacts);
         let coefficient = self.laws.friction_at(self.chain.fraction(candidate));
         let friction = self.laws.friction(self.chain.contact, coefficient, &stiffness, contacts);
         let points = self.memory.map_or(&[][..], |memory| &memory.points);
-        let carried = predecessors.traction(1.0, &|number| (&points[number], 1.0));
-        ContactLaw { radius: self.chain.radius, normal, friction, carried, place: candidate.place }
+        let carried = predecessors.traction(candidate.weight, &|number| &points[number]);
+        let Candidate { place, weight, .. } = *candidate;
+        ContactLaw { radius: self.chain.radius, normal, friction, carried, place, weight }
     }
 
     /// The memory of a point with a force. Before a state is accepted, traction and normal remain
@@ -150,13 +152,14 @@ impl<'a> ChainNow<'a> {
         PointMemory {
             place: candidate.along(),
             edge: candidate.edge,
+            weight: candidate.weight,
             force,
             multiplier,
             gap,
             carried,
             offset: law.normal.offset(),
             steps: before.map_or(0, |before| before.steps) + u32::from(is_penalty),
-            push: *rotation * state.force(),
+            push: *rotation * state.force() * candidate.weight,
             at: contact,
         }
     }
@@ -221,6 +224,6 @@ fn sum<const N: usize>(factors: &[f64; N], places: &[Vec3; N]) -> Vec3 {
 impl PointNow<'_> {
     /// The work of friction since the last converged state.
     pub(super) fn friction_work(&self) -> f64 {
-        self.state.traction.work(&self.law.carried, self.state.normal)
+        self.candidate.weight * self.state.traction.work(&self.law.carried, self.state.normal)
     }
 }

@@ -134,10 +134,26 @@ impl SurfaceContacts {
         self.pairs().remember(at, accepts);
     }
 
+    /// Gives each point in memory the part of the force that its place has in a dynamic stage: its force stays.
+    fn share_held(&self, at: &mut State) {
+        let mut chains = (*at.contacts.chains).clone();
+        for (number, memory) in chains.iter_mut().enumerate().filter(|(number, _)| self.is_near(*number, at)) {
+            let chain = self.chain_now(number, at, Weights::NONE);
+            for (candidate, predecessors) in chain.candidates.iter().zip(&chain.predecessors) {
+                if let Some(own) = predecessors.own {
+                    memory.points[own].share(candidate.weight);
+                }
+            }
+        }
+        at.contacts.chains = Arc::new(chains);
+    }
+
     /// The energy of elastic stick of the points in memory.
     fn stick_energy(&self, at: &State) -> f64 {
         let mut energy = 0.0;
-        self.each_spring(at, &mut |_, point, stiffness| energy += point.carried.force.squared() / (2.0 * stiffness));
+        self.each_spring(at, &mut |_, point, stiffness| {
+            energy += point.weight * point.carried.force.squared() / (2.0 * stiffness)
+        });
         energy + self.pairs().stick_energy(at)
     }
 
@@ -238,7 +254,8 @@ impl SurfaceContacts {
         if at.contacts.regime == ContactRegime::Penalty && self.laws.iter().any(|laws| laws.damping != 0.0) {
             self.each_chain(at, Weights::NONE, &mut |_, chain| {
                 chain.each_point(Weights::NONE, &mut |point, _| {
-                    power += point.law.normal.damping_power(point.state.gap, point.state.normal_force.force);
+                    let of_point = point.law.normal.damping_power(point.state.gap, point.state.normal_force.force);
+                    power += point.candidate.weight * of_point;
                 });
             });
             power += self.pairs().damping_power(at);
@@ -418,11 +435,15 @@ impl Contacts for SurfaceContacts {
     }
 
     fn hold(&self, at: &mut State) {
-        at.contacts.regime = ContactRegime::Augmented;
         at.contacts.factor = HELD;
         self.change_points(at, |point, stiffness| {
             point.multiplier = point.force + stiffness.augmented * HELD * point.gap
         });
+    }
+
+    fn begin_augmented(&self, at: &mut State) {
+        at.contacts.regime = ContactRegime::Augmented;
+        self.share_held(at);
     }
 
     fn begin_penalty(&self, at: &mut State) {
@@ -430,6 +451,7 @@ impl Contacts for SurfaceContacts {
         at.contacts.shortest = None;
         let before = Contacts::energy(self, at);
         at.contacts.regime = ContactRegime::Penalty;
+        self.share_held(at);
         self.pairs().begin_penalty(at);
         self.change_points(at, |point, stiffness| {
             point.offset = point.force / stiffness.penalty + point.gap;
@@ -577,7 +599,9 @@ impl Contacts for SurfaceContacts {
         let mut energy = self.stick_energy(at);
         if at.contacts.regime == ContactRegime::Penalty {
             self.each_chain(at, Weights::NONE, &mut |_, chain| {
-                chain.each_point(Weights::NONE, &mut |point, _| energy += point.law.normal.energy(point.state.gap));
+                chain.each_point(Weights::NONE, &mut |point, _| {
+                    energy += point.candidate.weight * point.law.normal.energy(point.state.gap);
+                });
             });
             energy += self.pairs().energy(at);
         }

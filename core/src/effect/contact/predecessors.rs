@@ -79,15 +79,15 @@ impl Predecessors {
         self.own.into_iter().chain(self.merged.iter().copied())
     }
 
-    /// The traction that a candidate of this weight takes over. `point` has the memory of a point and
-    /// its weight, by its number. Tractions of points that merge add up, turned to the first normal.
-    pub fn traction<'a>(&self, weight: f64, point: &dyn Fn(usize) -> (&'a PointMemory, f64)) -> CarriedTraction {
+    /// The traction that a candidate of this weight takes over. `point` has the memory of a point by its
+    /// number. Tractions of points that merge add up, turned to the first normal.
+    pub fn traction<'a>(&self, weight: f64, point: &dyn Fn(usize) -> &'a PointMemory) -> CarriedTraction {
         let carried = |number: usize, part: f64| {
-            let whole = point(number).0.carried;
+            let whole = point(number).carried;
             CarriedTraction { force: whole.force * part, ..whole }
         };
         let own = self.own.map(|number| carried(number, 1.0));
-        let merged = self.merged.iter().map(|&number| carried(number, point(number).1 / weight));
+        let merged = self.merged.iter().map(|&number| carried(number, point(number).weight / weight));
         own.into_iter().chain(merged).reduce(CarriedTraction::with).unwrap_or_default()
     }
 }
@@ -101,9 +101,9 @@ mod tests {
         Link { candidate, point, relation, shift }
     }
 
-    fn point(force: Vec3, normal: Vec3, slides: bool) -> PointMemory {
+    fn point(force: Vec3, normal: Vec3, slides: bool, weight: f64) -> PointMemory {
         let carried = CarriedTraction { force, normal, slides };
-        PointMemory { carried, ..PointMemory::default() }
+        PointMemory { carried, weight, ..PointMemory::default() }
     }
 
     #[test]
@@ -133,14 +133,15 @@ mod tests {
     fn tractions_of_merged_points_add_up_on_the_tangent_plane() {
         let [x, y, z] = Vec3::UNIT;
         let tilted = (z + x * 0.1).normalized().unwrap();
-        let memory = [point(x * 0.25, z, false), point((x - z * 0.1).normalized().unwrap(), tilted, true)];
-        let of = |number: usize| (&memory[number], [1.0, 0.5][number]);
+        let along = (x - z * 0.1).normalized().unwrap();
+        let memory = [point(x * 0.25, z, false, 1.0), point(along, tilted, true, 0.5)];
+        let of = |number: usize| &memory[number];
         let predecessors = Predecessors { own: Some(0), merged: vec![1] };
         let both = predecessors.traction(1.0, &of);
         assert!((both.force - x * 0.75).norm() < 1e-15 && both.normal == z);
         assert!(!both.slides);
-        let turned = [point(x, z, true), point(y, -z, true)];
-        let of = |number: usize| (&turned[number], 1.0);
+        let turned = [point(x, z, true, 1.0), point(y, -z, true, 1.0)];
+        let of = |number: usize| &turned[number];
         assert_eq!(predecessors.traction(1.0, &of).force, x);
     }
 }

@@ -26,8 +26,8 @@ pub(super) fn resultant(chains: &[Chain], surfaces: &[SceneSurface], number: usi
         let about = if carrier.is_node { carrier.place } else { o };
         sum.gap = sum.gap.min(chain.least_gap(&surface.surface, &carrier, at));
         for point in points(k, at) {
-            sum.normal += point.force;
-            sum.friction += point.carried.force.norm();
+            sum.normal += point.weight * point.force;
+            sum.friction += point.weight * point.carried.force.norm();
             sum.force += point.push;
             sum.moment += (point.at - about).cross(point.push);
             sum.points += 1;
@@ -80,6 +80,6 @@ fn place_and_force(chain: &Chain, points: &[PointMemory], number: Option<usize>)
         Some(_) => (points.first().filter(|_| chain.is_closed())?, round),
         None => (points.last().filter(|_| chain.is_closed())?, -round),
     };
-    let share = chain.share(point.place);
-    Some((point.place + shift, [point.force / share, point.carried.force.norm() / share]))
+    let per_length = point.weight / chain.share(point.place);
+    Some((point.place + shift, [point.force, point.carried.force.norm()].map(|force| force * per_length)))
 }

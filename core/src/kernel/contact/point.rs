@@ -9,8 +9,9 @@
 //! spin of S_i:  W_i = S_i T_i dP_i - T_s dP_s
 //! ```
 //!
-//! With the normal force p and the traction t (force on the element, carrier axes) of a gap g = phi
-//! - r, F = p n + t, m = n x t and b = y - r n, the internal forces are
+//! With the normal force p and the traction t (force on the element, carrier axes; both times the
+//! part of the force that the point carries) of a gap g = phi - r, F = p n + t, m = n x t and
+//! b = y - r n, the internal forces are
 //!
 //! ```text
 //! f_x_i = -N_i Q F    f_P_i = N_i r T_i^T S_i^T m    f_c = Q F    f_P_s = T_s^T (b x F)
@@ -129,6 +130,8 @@ pub struct ContactLaw {
     pub(crate) carried: CarriedTraction,
     /// The place of the point on its element
     pub(crate) place: Place,
+    /// The part of the force that the point carries
+    pub(crate) weight: f64,
 }
 
 /// The state of a contact point.
@@ -150,7 +153,7 @@ impl<T: Real> PointState<T> {
         if self.normal_force.is_open() { Status::Open } else { self.traction.status }
     }
 
-    /// F = p n + t, the force on the element, in the axes of the carrier.
+    /// F = p n + t, the force on the element without the weight, in the axes of the carrier.
     pub fn force(&self) -> Vec3<T> {
         self.normal * self.normal_force.force + self.traction.force
     }
@@ -260,12 +263,12 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
     /// F = p n + t
     fn force(&self) -> Derived<T> {
         let n = self.distance.normal;
-        let p = self.state.normal_force.force;
+        let p = self.state.normal_force.force * self.law.weight;
         let friction = self.traction();
         Derived {
             value: n * p + friction.value,
             over_place: self.distance.curvature * p + friction.over_place,
-            over_pressure: n + friction.over_pressure,
+            over_pressure: n.scale(self.law.weight) + friction.over_pressure,
             ..friction
         }
     }
@@ -287,17 +290,17 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
     /// t, with da = dy - dy0 + r n~ dtheta - r theta~ H dy.
     fn traction(&self) -> Derived<T> {
         let t = &self.state.traction;
-        let r = self.law.radius;
+        let ContactLaw { radius: r, weight, .. } = *self.law;
         let n = self.distance.normal;
         let angle = self.turned.as_ref().map_or(Vec3::zero(), |turned| turned.angle);
         let curvature = self.distance.curvature;
         let slides = Mat3::identity() - Mat3::skew_mul(angle, curvature).scale(r);
         Derived {
-            value: t.force,
-            over_place: t.over_sliding * slides + t.over_normal * curvature,
-            over_rolling: t.over_sliding * n.skew(),
-            over_before: -t.over_sliding,
-            over_pressure: t.over_pressure,
+            value: t.force.scale(weight),
+            over_place: (t.over_sliding * slides + t.over_normal * curvature).scale(weight),
+            over_rolling: (t.over_sliding * n.skew()).scale(weight),
+            over_before: -t.over_sliding.scale(weight),
+            over_pressure: t.over_pressure.scale(weight),
         }
     }
 

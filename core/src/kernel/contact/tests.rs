@@ -251,6 +251,7 @@ fn random_scene<const N: usize>(random: &mut Random, surface: &Surface, kind: Ki
             friction: None,
             carried: CarriedTraction::default(),
             place: kind.place,
+            weight: 0.75,
         },
         s: random.between(0.0, 1.0),
     };
@@ -552,6 +553,7 @@ fn balls_that_roll_do_not_slide() {
             friction: Some(FrictionLaw { coefficient: 0.5, stiffness: 10.0, resistance: 0.0, goes_on: false }),
             carried: CarriedTraction::default(),
             place: Place::Fixed,
+            weight: 1.0,
         },
         s: 0.0,
     };

@@ -139,7 +139,7 @@ impl PairRole<'_> {
     pub(in crate::effect::contact) fn stick_energy(self, at: &State) -> f64 {
         let mut energy = 0.0;
         self.each_spring(at, &mut |point, stiffness| {
-            energy += point.weight * point.point.carried.force.squared() / (2.0 * stiffness);
+            energy += point.point.weight * point.point.carried.force.squared() / (2.0 * stiffness);
         });
         energy
     }

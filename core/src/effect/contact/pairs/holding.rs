@@ -71,15 +71,15 @@ impl PairsNow<'_> {
             let (mut force, mut traction) = (0.0, Vec3::ZERO);
             for link in held() {
                 let before = &known[link.point];
-                let part = before.weight * heirs.nearness(k, link) / weights[link.point];
+                let part = before.point.weight * heirs.nearness(k, link) / weights[link.point];
                 force += before.point.force * part;
                 traction += before.point.carried.force * part;
             }
             let elements = self.list[*number].elements;
             let [place, on_second] = [0, 1].map(|side| f64::from(elements[side]) + candidate.at[side]);
             let carried = CarriedTraction { force: traction, ..nearest.point.carried };
-            let point = PointMemory { place, force, carried, ..nearest.point };
-            out.push(PairPointMemory { kind: candidate.kind, on_second, weight: candidate.weight, point, ..*nearest });
+            let point = PointMemory { place, force, carried, weight: candidate.weight, ..nearest.point };
+            out.push(PairPointMemory { kind: candidate.kind, on_second, point, ..*nearest });
         }
         out.extend(known.iter().zip(&weights).filter(|(_, weight)| **weight == 0.0).map(|(point, _)| *point));
     }

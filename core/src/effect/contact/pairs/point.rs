@@ -146,7 +146,7 @@ impl<'a> PairsNow<'a> {
         let mut system = ElementSystem::new(2 * (orders[0] + orders[1] + 2));
         for (&Found { number, candidate }, predecessors) in found.iter().zip(all) {
             let partner = predecessors.own.map(|own| &known[own]);
-            let carried = predecessors.traction(candidate.weight, &|own| (&known[own].point, known[own].weight));
+            let carried = predecessors.traction(candidate.weight, &|own| &known[own].point);
             let part = Part { number, pair: self.list[number], candidate, predecessors, first_known, partner, carried };
             let law = self.law(&part, laws);
             system.clear_for(weights);
@@ -290,8 +290,7 @@ impl<'a> PairsNow<'a> {
         let contacts = &self.at.contacts;
         let stiffness = self.stiffness(pair);
         let multiplier = partner.map_or(0.0, |known| known.point.multiplier);
-        // A point whose share grows pushes no more by its offset than before.
-        let offset = partner.map_or(0.0, |known| known.point.offset * (known.weight / candidate.weight).min(1.0));
+        let offset = partner.map_or(0.0, |known| known.point.offset_at(candidate.weight));
         let normal = laws.normal_law(multiplier, offset, &stiffness, contacts);
         let [a, b] = self.pairs.both(pair.meeting as usize);
         let friction = self.friction(pair, candidate, laws);
@@ -381,10 +380,10 @@ impl<'a> PairsNow<'a> {
             meeting: pair.meeting,
             kind: candidate.kind,
             on_second: f64::from(pair.elements[1]) + candidate.at[1],
-            weight: candidate.weight,
             point: PointMemory {
                 place: f64::from(pair.elements[0]) + candidate.at[0],
                 edge: None,
+                weight: candidate.weight,
                 force,
                 multiplier: if accepts { force + first * gap } else { force },
                 gap,

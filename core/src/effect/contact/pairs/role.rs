@@ -258,8 +258,8 @@ impl<'a> PairRole<'a> {
         for point in memory.points.iter().filter(|point| self.pairs.contact_of(point.meeting as usize) == number) {
             let meeting = &self.pairs.meetings[point.meeting as usize];
             let [first, _] = self.pairs.both(point.meeting as usize);
-            sum.normal += point.weight * point.point.force;
-            sum.friction += point.weight * point.point.carried.force.norm();
+            sum.normal += point.point.weight * point.point.force;
+            sum.friction += point.point.weight * point.point.carried.force.norm();
             sum.points += 1;
             sum.sliding += usize::from(point.point.carried.slides);
             if !meeting.is_own() {
@@ -268,8 +268,8 @@ impl<'a> PairRole<'a> {
             }
             let share = first.share(point.point.place);
             sum.length += match point.kind {
-                PairPointKind::Closest => point.weight * share,
-                PairPointKind::NodeOfFirst => 2.0 * point.weight * share,
+                PairPointKind::Closest => point.point.weight * share,
+                PairPointKind::NodeOfFirst => 2.0 * point.point.weight * share,
                 PairPointKind::NodeOfSecond => 0.0,
             };
         }
@@ -304,8 +304,8 @@ impl<'a> PairRole<'a> {
             for (side, place) in [point.point.place, point.on_second].into_iter().enumerate() {
                 if strands[side] == number {
                     let near = (1.0 - order * strand.shift(place, node / order)).max(0.0);
-                    forces[0] += point.weight * point.point.force * near;
-                    forces[1] += point.weight * point.point.carried.force.norm() * near;
+                    forces[0] += point.point.weight * point.point.force * near;
+                    forces[1] += point.point.weight * point.point.carried.force.norm() * near;
                 }
             }
         }
