@@ -28,6 +28,10 @@ const PENETRATION: f64 = 1e-3;
 /// The first stiffness of contacts with beams, over the bending stiffness of an element.
 const OF_BENDING: f64 = 1e-2;
 
+/// The stiffness with which contacts of static stages begin is at most this factor times EA/h, with the distance h
+/// of nodes: results do not depend on it, but round-off of gaps times a larger one would be forces.
+const STIFFEST: f64 = 1e4;
+
 /// The first stiffness of contacts with beams, over the stiffness of an element in extension.
 const OF_EXTENSION: f64 = 1e-4;
 
@@ -307,13 +311,13 @@ impl Composer<'_> {
 
     /// The stiffness of contacts of element `k` of a beam.
     fn stiffness_of(&self, contact: &deck::Contact, beam: &MeshBeam, k: usize) -> ContactStiffness {
-        if let Some(stiffness) = contact.stiffness {
-            return ContactStiffness { augmented: stiffness, penalty: stiffness };
-        }
         let [from, to] = [beam.fractions[k * beam.order], beam.fractions[(k + 1) * beam.order]];
         let section = beam.section.at(0.5 * (from + to));
         let width = beam.line.length * (to - from) / beam.order as f64;
         let extension = section.stiffness[0][0] / width;
+        if let Some(stiffness) = contact.stiffness {
+            return ContactStiffness { augmented: stiffness.min(STIFFEST * extension), penalty: stiffness };
+        }
         let bending = section.stiffness[4][4].min(section.stiffness[5][5]) / (width * width * width);
         let mass = section.mass.map_or(0.0, |mass| mass.mass) * width;
         let resolved = match shortest_step(self.deck) {
