@@ -286,14 +286,6 @@ impl SeenChain<'_> {
         }
     }
 
-    /// The element beyond an end of element `k`, 0 or 1.
-    fn neighbour(&self, k: usize, end: f64) -> Option<usize> {
-        let count = self.chain.elements();
-        let is_last = k == if end == 1.0 { count - 1 } else { 0 };
-        let step = if end == 1.0 { 1 } else { count - 1 };
-        (!is_last || self.chain.is_closed()).then(|| (k + step) % count)
-    }
-
     /// The part of a force that the closest point of element `k` carries. At the inside of a kink, the
     /// elements on both sides have closest points, of which one comes or goes at the kink, where the other
     /// one has a force. In a dynamic stage its part fades towards the kink.
@@ -312,7 +304,7 @@ impl SeenChain<'_> {
             let outward = self.tangent(element, end).normalized()? * (2.0 * end - 1.0);
             Some(distance(self.place(element, end))?.normal.dot(outward))
         };
-        let rises = self.neighbour(k, end).and_then(|beyond| Some([rise(k, end)?, rise(beyond, 1.0 - end)?]));
+        let rises = self.chain.neighbour(k, end).and_then(|beyond| Some([rise(k, end)?, rise(beyond, 1.0 - end)?]));
         match rises {
             Some([own, beyond]) if own >= 0.0 && beyond > 0.0 => own / (own + beyond),
             Some(_) | None => 1.0,
@@ -392,10 +384,11 @@ impl SeenChain<'_> {
             let falls = |k: usize, s: f64| {
                 distance(self.place(k, s)).is_some_and(|distance| distance.normal.dot(self.tangent(k, s)) < 0.0)
             };
-            if self.neighbour(k, 0.0).is_none_or(|before| falls(before, 1.0)) && !falls(k, 0.0) && is_beside(0.0) {
+            if self.chain.neighbour(k, 0.0).is_none_or(|before| falls(before, 1.0)) && !falls(k, 0.0) && is_beside(0.0)
+            {
                 found.push(at(0.0, Place::Fixed, 1.0));
             }
-            if self.neighbour(k, 1.0).is_none() && falls(k, 1.0) && is_beside(1.0) {
+            if self.chain.neighbour(k, 1.0).is_none() && falls(k, 1.0) && is_beside(1.0) {
                 found.push(at(1.0, Place::Fixed, 1.0));
             }
         }

@@ -65,6 +65,14 @@ impl Strand {
         self.order > 0 && self.nodes[0].node.u == self.nodes[self.nodes.len() - 1].node.u
     }
 
+    /// The element beyond an end of an element, 0 or 1.
+    pub(super) fn neighbour(&self, element: usize, end: f64) -> Option<usize> {
+        let count = self.elements();
+        let is_last = element == if end == 1.0 { count - 1 } else { 0 };
+        let step = if end == 1.0 { 1 } else { count - 1 };
+        (!is_last || self.is_closed()).then(|| (element + step) % count)
+    }
+
     /// The length of element `k`; zero for a body.
     pub(super) fn element_length(&self, k: usize) -> f64 {
         let nodes = self.nodes_of(k);

@@ -209,11 +209,8 @@ impl PairsNow<'_> {
 
     /// The element beyond an end of an element, 0 or 1.
     fn neighbour(&self, of: ElementOf, end: f64) -> Option<ElementOf> {
-        let strand = &self.pairs.strands[of.strand];
-        let count = strand.elements();
-        let is_last = of.element == if end == 1.0 { count - 1 } else { 0 };
-        let step = if end == 1.0 { 1 } else { count - 1 };
-        (!is_last || strand.is_closed()).then(|| ElementOf { element: (of.element + step) % count, ..of })
+        let element = self.pairs.strands[of.strand].neighbour(of.element, end)?;
+        Some(ElementOf { element, ..of })
     }
 
     pub(super) fn place_and_slope(&self, of: ElementOf, s: f64) -> [Vec3; 2] {
