@@ -160,10 +160,7 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
             && now.len() >= wanted.min(operator.size())
             && now.iter().zip(&last).take(guard).all(same);
         if still || !grows {
-            let mut pairs = space.pairs(operator.is_symmetric(), wanted)?;
-            if !operator.is_symmetric() {
-                mend_vectors(&space.projection(), &mut pairs)?;
-            }
+            let pairs = space.pairs(operator.is_symmetric(), wanted)?;
             return Some(Spectrum::of(pairs, space));
         }
         last = now;
@@ -174,6 +171,32 @@ impl Spectrum {
     fn of(pairs: Vec<Eigenpair>, space: KrylovSpace) -> Self {
         let (values, coordinates) = pairs.into_iter().unzip();
         Self { values, coordinates, space, is_complete: true }
+    }
+
+    /// Finds vectors of multiple eigenvalues again, of which back substitution may give only one well: the
+    /// others by inverse iteration. `None` after a request to stop.
+    pub fn mend_vectors(&mut self) -> Option<()> {
+        let projection = self.space.projection();
+        for number in 0..self.values.len() {
+            let theta = self.values[number];
+            let is_same = |k: &usize| (self.values[*k] - theta).norm() <= SAME_EIGENVALUE * theta.norm();
+            let same: Vec<usize> = (0..self.values.len()).filter(is_same).collect();
+            let is_good = |k: usize| left_over(&projection, theta, &self.coordinates[k]) <= GOOD_VECTOR;
+            if theta.norm() == 0.0 || same.len() < 2 || is_good(number) {
+                continue;
+            }
+            if interrupt::is_requested() {
+                return None;
+            }
+            let mut good: Vec<Vec<Complex<f64>>> = Vec::new();
+            for k in same.into_iter().filter(|&k| is_good(k)) {
+                let mut vector = self.coordinates[k].clone();
+                take_out(&good, &mut vector);
+                good.push(vector);
+            }
+            self.coordinates[number] = vector_beside(&projection, theta, &good, number);
+        }
+        Some(())
     }
 
     /// Real and imaginary part of an eigenvector.
@@ -454,46 +477,32 @@ fn eigenpairs(matrix: &Mat<f64>) -> Vec<Eigenpair> {
     }
 }
 
-/// Vectors of multiple eigenvalues, of which back substitution may give only one well: the others by
-/// inverse iteration, orthogonal to it. `None` after a request to stop.
-fn mend_vectors(projection: &Mat<f64>, pairs: &mut [Eigenpair]) -> Option<()> {
+/// An eigenvector of a projection orthogonal to others of the same eigenvalue, by inverse iteration from start
+/// vector `number`.
+fn vector_beside(
+    projection: &Mat<f64>,
+    theta: Complex<f64>,
+    others: &[Vec<Complex<f64>>],
+    number: usize,
+) -> Vec<Complex<f64>> {
     let size = projection.nrows();
-    for number in 0..pairs.len() {
-        let theta = pairs[number].0;
-        let is_same = |other: &Eigenpair| (other.0 - theta).norm() <= SAME_EIGENVALUE * theta.norm();
-        let is_multiple = pairs.iter().filter(|other| is_same(other)).count() > 1;
-        if theta.norm() == 0.0 || !is_multiple || left_over(projection, &pairs[number]) <= GOOD_VECTOR {
-            continue;
-        }
-        if interrupt::is_requested() {
-            return None;
-        }
-        let is_good = |other: &&Eigenpair| is_same(other) && left_over(projection, other) <= GOOD_VECTOR;
-        let mut others: Vec<Vec<Complex<f64>>> = Vec::new();
-        for (_, vector) in pairs.iter().filter(is_good) {
-            let mut vector = vector.clone();
-            take_out(&others, &mut vector);
-            others.push(vector);
-        }
-        let beside = theta * (1.0 + BESIDE_EIGENVALUE);
-        let shifted = Mat::from_fn(size, size, |i, j| {
-            Complex::from(projection[(i, j)]) - if i == j { beside } else { Complex::default() }
-        });
-        let factors = shifted.partial_piv_lu();
-        let mut vector: Vec<Complex<f64>> = start(size, number).into_iter().map(Complex::from).collect();
-        for _ in 0..INVERSE_ITERATIONS {
-            take_out(&others, &mut vector);
-            let solved = factors.solve(Mat::from_fn(size, 1, |i, _| vector[i]));
-            vector = (0..size).map(|i| solved[(i, 0)]).collect();
-        }
-        take_out(&others, &mut vector);
-        pairs[number].1 = vector;
+    let beside = theta * (1.0 + BESIDE_EIGENVALUE);
+    let shifted = Mat::from_fn(size, size, |i, j| {
+        Complex::from(projection[(i, j)]) - if i == j { beside } else { Complex::default() }
+    });
+    let factors = shifted.partial_piv_lu();
+    let mut vector: Vec<Complex<f64>> = start(size, number).into_iter().map(Complex::from).collect();
+    for _ in 0..INVERSE_ITERATIONS {
+        take_out(others, &mut vector);
+        let solved = factors.solve(Mat::from_fn(size, 1, |i, _| vector[i]));
+        vector = (0..size).map(|i| solved[(i, 0)]).collect();
     }
-    Some(())
+    take_out(others, &mut vector);
+    vector
 }
 
 /// |P x - theta x| over |theta x|
-fn left_over(projection: &Mat<f64>, (theta, x): &Eigenpair) -> f64 {
+fn left_over(projection: &Mat<f64>, theta: Complex<f64>, x: &[Complex<f64>]) -> f64 {
     let row = |i: usize| -> Complex<f64> { x.iter().enumerate().map(|(j, x)| x * projection[(i, j)]).sum() };
     let left: f64 = (0..x.len()).map(|i| (row(i) - theta * x[i]).norm_sqr()).sum();
     (left / x.iter().map(Complex::norm_sqr).sum::<f64>()).sqrt() / theta.norm()

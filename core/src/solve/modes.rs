@@ -351,7 +351,10 @@ impl<'a> ModeSearch<'a> {
         let room = self.room(wanted);
         let diagonal = self.inner_product();
         let mut operator = ModeOperator { search: self, diagonal };
-        let spectrum = largest_eigenvalues(&mut operator, room)?;
+        let mut spectrum = largest_eigenvalues(&mut operator, room)?;
+        if !operator.is_symmetric() {
+            spectrum.mend_vectors()?;
+        }
         let mut right = Vec::new();
         for number in 0..spectrum.values.len() {
             let theta = spectrum.values[number];

@@ -64,7 +64,7 @@ pub struct NewtonMemory {
 
 /// Corrections below this size (relative to the length of the scene, or in radians) do not count
 /// for the contraction.
-pub(crate) const SMALLEST_COMPARED_CORRECTION: f64 = 1e-6;
+const SMALLEST_COMPARED_CORRECTION: f64 = 1e-6;
 
 /// Corrections above this size (relative to the length of the scene, or in radians) show
 /// divergence.
@@ -73,6 +73,11 @@ const DIVERGED_CORRECTION: f64 = 1e6;
 /// The same for static levels that begin with points that touch: none of 230 attempts with such a
 /// correction has come to a balance, and another stiffness of the contacts is tried.
 const DIVERGED_IN_CONTACT: f64 = 30.0;
+
+/// A correction of size `now` over the one before it; zero where that tells nothing.
+pub fn contraction(last: Option<f64>, now: f64) -> f64 {
+    last.filter(|&last| last > SMALLEST_COMPARED_CORRECTION).map_or(0.0, |last| now / last)
+}
 
 impl Newton {
     /// Newton's iteration for a stage with this system.
@@ -373,9 +378,7 @@ impl Solution<'_> {
     /// Adds a correction of size `length` to the state.
     fn correct(&mut self, length: f64) {
         let newton = &mut *self.newton;
-        if let Some(last) = newton.last.filter(|&last| last > SMALLEST_COMPARED_CORRECTION) {
-            newton.contraction = newton.contraction.max(length / last);
-        }
+        newton.contraction = newton.contraction.max(contraction(newton.last, length));
         let changes_charts = self.method.changes_charts();
         if changes_charts && self.iterations == 1 {
             newton.first.take(newton.dq.len(), |slot| newton.dq[slot].0);

@@ -138,7 +138,7 @@ impl PointMemory {
     }
 
     /// Gives the point another part of the force, which stays the same with it.
-    pub fn share(&mut self, weight: f64) {
+    pub fn reweigh(&mut self, weight: f64) {
         let factor = self.weight / weight;
         self.weight = weight;
         self.force *= factor;

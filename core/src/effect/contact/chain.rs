@@ -1,12 +1,13 @@
 //! A beam or a body against one surface: its nodes, and its candidates for contact.
 //!
 //! The candidates of a state are the closest points between the ends of elements
-//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one; in dynamic stages
-//! closest points and the nodes beside them share the force, so that it does not jump where a closest
-//! point passes from one element to the next. At boxes and meshes the
+//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. At boxes and meshes the
 //! closest points to edges are candidates as well ([`crate::kernel::contact::edge`]). Elements from
 //! which the surface is farther than they reach have none: the distance changes by no more than a
 //! point moves.
+//!
+//! In dynamic stages closest points and the nodes beside them share the force, so that it does not
+//! jump where a closest point passes from one element to the next.
 
 use super::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
 use super::strand::{ChainNode, Strand};
@@ -90,6 +91,7 @@ struct SeenChain<'a> {
     free: (Vec3, f64),
     /// Points of the chain with a force at the last look
     points: &'a [PointMemory],
+    /// Whether candidates share forces: those of penalties do
     regime: ContactRegime,
 }
 
@@ -289,17 +291,17 @@ impl SeenChain<'_> {
     /// The part of a force that the closest point of element `k` carries. At the inside of a kink, the
     /// elements on both sides have closest points, of which one comes or goes at the kink, where the other
     /// one has a force. In a dynamic stage its part fades towards the kink.
-    fn share(&self, k: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> f64 {
+    fn weight(&self, k: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> f64 {
         match self.regime {
             ContactRegime::Augmented => 1.0,
-            ContactRegime::Penalty => self.share_at(k, 0.0, distance).min(self.share_at(k, 1.0, distance)),
+            ContactRegime::Penalty => self.weight_at(k, 0.0, distance).min(self.weight_at(k, 1.0, distance)),
         }
     }
 
     /// The part of a force that the kink at an end of element `k`, 0 or 1, leaves to it. With the rises a and
     /// b of the distance per length towards the kink, on this element and on the one beyond: a/(a + b), and 1 where
     /// the distance falls.
-    fn share_at(&self, k: usize, end: f64, distance: &dyn Fn(Vec3) -> Option<Distance>) -> f64 {
+    fn weight_at(&self, k: usize, end: f64, distance: &dyn Fn(Vec3) -> Option<Distance>) -> f64 {
         let rise = |element: usize, end: f64| {
             let outward = self.tangent(element, end).normalized()? * (2.0 * end - 1.0);
             Some(distance(self.place(element, end))?.normal.dot(outward))
@@ -318,8 +320,8 @@ impl SeenChain<'_> {
         of_surface.found().iter().map(|minimum| minimum.s).chain(of_edges).map(|s| self.place(k, s)).collect()
     }
 
-    /// Adds the closest points between the ends of element `k`. The edge of a body that has come inside the section pushes it out, too,
-    /// from the place where it is.
+    /// Adds the closest points between the ends of element `k`. The edge of a body that has come inside the
+    /// section pushes it out, too, from the place where it is.
     fn add_minima(&self, k: usize, candidates: &mut Vec<Candidate>) {
         // The node of a body touches edges and corners by its distance from the whole surface.
         if self.chain.order == 0 {
@@ -337,7 +339,7 @@ impl SeenChain<'_> {
                 continue;
             }
             let weight = match place {
-                Place::Closest => self.share(k, &distance),
+                Place::Closest => self.weight(k, &distance),
                 Place::Fixed => 1.0,
             };
             candidates.push(Candidate { element: k, s, place, edge: None, weight });
@@ -380,7 +382,7 @@ impl SeenChain<'_> {
             let minima = self.minima(k, &distance);
             let smooth = minima.found().iter().filter(|minimum| minimum.kind != MinimumKind::Kink);
             let beside = smooth.filter(|minimum| is_beside(minimum.s));
-            found.extend(beside.map(|minimum| at(minimum.s, Place::Closest, self.share(k, &distance))));
+            found.extend(beside.map(|minimum| at(minimum.s, Place::Closest, self.weight(k, &distance))));
             let falls = |k: usize, s: f64| {
                 distance(self.place(k, s)).is_some_and(|distance| distance.normal.dot(self.tangent(k, s)) < 0.0)
             };

@@ -134,14 +134,14 @@ impl SurfaceContacts {
         self.pairs().remember(at, accepts);
     }
 
-    /// Gives each point in memory the part of the force that its place has in a dynamic stage: its force stays.
+    /// Gives each point in memory the weight of its candidate in the stage that begins: its force stays.
     fn share_held(&self, at: &mut State) {
         let mut chains = (*at.contacts.chains).clone();
         for (number, memory) in chains.iter_mut().enumerate().filter(|(number, _)| self.is_near(*number, at)) {
             let chain = self.chain_now(number, at, Weights::NONE);
             for (candidate, predecessors) in chain.candidates.iter().zip(&chain.predecessors) {
                 if let Some(own) = predecessors.own {
-                    memory.points[own].share(candidate.weight);
+                    memory.points[own].reweigh(candidate.weight);
                 }
             }
         }

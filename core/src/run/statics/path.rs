@@ -18,7 +18,7 @@ use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
-use crate::solve::{self, Judgement, NewtonFailure, SMALLEST_COMPARED_CORRECTION, Tangent, Verdict, mechanism, timed};
+use crate::solve::{self, Judgement, NewtonFailure, Tangent, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -35,7 +35,8 @@ const SHORTEST: f64 = 1.0 / 16384.0;
 /// The cosine between tangents, or between a tangent and its chord, below which a step was too
 /// long: it may have come down on another branch.
 const MIN_COSINE: f64 = 0.8;
-/// Part of the first step below which a change of pivots is believed that no limit point explains.
+/// Part of the first step below which a change of pivots that no limit point explains is believed, and
+/// corrections may grow.
 const BELIEVED: f64 = 1.0 / 1024.0;
 /// Attempts to come nearer to a special point
 const MOST_LOOKS: usize = 40;
@@ -175,9 +176,8 @@ impl Path {
                     let cosine = dot(stage, &next.tangent, &self.here.tangent) * self.scale
                         + next.load_rate * self.here.load_rate;
                     let straight = cosine.min(length / self.chord(stage, &next)) >= MIN_COSINE;
-                    let has_strayed = self.may_have_jumped(&next, length)
-                        || (contraction > LARGEST_CONTRACTION && length > BELIEVED * self.first);
-                    let fine = straight && !has_strayed;
+                    let has_strayed = contraction > LARGEST_CONTRACTION || self.may_have_jumped(&next);
+                    let fine = straight && !(has_strayed && length > BELIEVED * self.first);
                     if fine || length <= SHORTEST * self.first {
                         let factor = (EASY / iterations.max(1) as f64).sqrt().clamp(0.5, 2.0);
                         let is_easy = iterations <= 2 && cosine >= STRAIGHT;
@@ -221,14 +221,14 @@ impl Path {
         (squared(stage, &moved) * self.scale + risen * risen).sqrt()
     }
 
-    /// True if a step of this length may have gone to another branch: along a path one pivot
+    /// True if a step may have gone to another branch: along a path one pivot
     /// changes its sign where the load turns, and else only where another branch begins, which a
     /// short step passes by.
-    fn may_have_jumped(&self, next: &PathPoint, length: f64) -> bool {
+    fn may_have_jumped(&self, next: &PathPoint) -> bool {
         let (Some(before), Some(after)) = (self.here.signature, next.signature) else { return false };
         // On a limit point the load has turned already.
         let turned = !self.here.on_limit && (next.load_rate > 0.0) != (self.here.load_rate > 0.0);
-        before.changes_to(after) != usize::from(turned) && length > BELIEVED * self.first
+        before.changes_to(after) != usize::from(turned)
     }
 
     /// Goes `length` along the tangent and back to the path; leaves the run's state there and
@@ -271,9 +271,7 @@ impl Path {
             }
             load += dl;
             let size = solve::size(stage.model, &dq);
-            if let Some(last) = last.filter(|&last| last > SMALLEST_COMPARED_CORRECTION) {
-                done.contraction = done.contraction.max(size / last);
-            }
+            done.contraction = done.contraction.max(solve::contraction(last, size));
             let switched = correct(stage, &dq);
             // What was a correction before is none in a new chart.
             last = Some(if switched { f64::INFINITY } else { size });
