@@ -1,37 +1,21 @@
 //! Critical loads on the paths of buckling stages: one row for each point.
 
 use crate::random::Random;
-use beamsim::scene;
-use beamsim_core::run::{CriticalKind, CriticalLoad, Failure, Observer, Run, Snapshot, StageResult};
-use beamsim_core::tensor::Vec3;
+use crate::scenes::{list, results};
+use beamsim_core::run::{CriticalKind, CriticalLoad, StageResult};
 use std::fs;
 use std::path::Path;
-
-#[derive(Default)]
-struct Loads(Vec<CriticalLoad>);
-
-impl Observer for Loads {
-    fn row(&mut self, _at: &Snapshot) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
-        if let StageResult::CriticalLoads(loads) = result {
-            self.0.clone_from(loads);
-        }
-        Ok(())
-    }
-}
 
 fn deck(path: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("decks").join(path)).unwrap()
 }
 
 fn critical_loads(text: &str) -> Vec<CriticalLoad> {
-    let (scene, _) = scene::from_text(text).unwrap_or_else(|found| panic!("{}\n{text}", found[0].message));
-    let mut loads = Loads::default();
-    Run::new(scene.plan, &mut loads).finish().0.unwrap();
-    loads.0
+    let of_stage = |result| match result {
+        StageResult::CriticalLoads(loads) => Some(loads),
+        StageResult::Modes(_) => None,
+    };
+    results(text).into_iter().filter_map(of_stage).next_back().unwrap()
 }
 
 fn with_modes(text: &str, modes: usize) -> String {
@@ -77,17 +61,16 @@ fn columns_in_any_direction_have_double_branches() {
         let across = along.cross(random.direction()).normalized().unwrap();
         let bending = 10f64.powf(random.range(-1.0, 2.0));
         let stretching = bending / (length * length) * 10f64.powf(random.range(4.0, 7.0));
-        let vector = |v: Vec3| format!("[{}, {}, {}]", v.0[0], v.0[1], v.0[2]);
         let exact = std::f64::consts::PI.powi(2) / 4.0 * bending / (length * length);
         let text = format!(
             "[point]\na = [0, 0, 0]\nb = {}\n[section.s]\nEA = {stretching}\nGA = {}\nGJ = {bending}\nEI = {bending}\n\
              [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 12\norder = 2\naxis3 = {}\n\
              [[support]]\nat = \"a\"\nfix = \"all\"\n[[load]]\nat = \"b\"\nforce = {}\n[[stage]]\nkind = \"static\"\nsteps = 1\n\
              [[stage]]\nkind = \"buckling\"\nmodes = 2\n",
-            vector(along * length),
+            list(along * length),
             stretching * 100.0,
-            vector(across),
-            vector(along * (-0.5 * exact)),
+            list(across),
+            list(along * (-0.5 * exact)),
         );
         let found = critical_loads(&text);
         let [one, other] = found[..] else { panic!("{case}: {found:?}\n{text}") };

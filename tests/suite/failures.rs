@@ -1,8 +1,7 @@
 //! Runs that must end in a named failure, with the right node and direction.
 
-use crate::scenes::attempt;
-use beamsim::scene;
-use beamsim_core::run::{Failure, Observer, Run, Snapshot, StageResult};
+use crate::scenes::{attempt, frequencies};
+use beamsim_core::run::Failure;
 
 const ARM: &str = r#"
 [point]
@@ -155,31 +154,6 @@ fn round_off_is_no_growth_of_energy() {
         [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\nscheme = \"generalized_alpha\"\n";
     let ended = attempt(text).result;
     assert!(ended.is_ok(), "{ended:?}");
-}
-
-/// The frequencies of the modes of a run.
-#[derive(Default)]
-struct Frequencies(Vec<f64>);
-
-impl Observer for Frequencies {
-    fn row(&mut self, _snapshot: &Snapshot) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
-        if let StageResult::Modes(modes) = result {
-            self.0.extend(modes.iter().map(|mode| mode.omega));
-        }
-        Ok(())
-    }
-}
-
-/// Those of all modal stages of a deck, which must finish.
-pub fn frequencies(text: &str) -> Vec<f64> {
-    let mut found = Frequencies::default();
-    let plan = scene::from_text(text).unwrap_or_else(|error| panic!("{error:?}")).0.plan;
-    assert_eq!(Run::new(plan, &mut found).finish().0, Ok(()));
-    found.0
 }
 
 /// Where few modes are asked for, they are all rigid: a second look about a part of the lowest elastic one has none to go by.

@@ -1,7 +1,7 @@
 //! Decks from files of other programs: blades of BeamDyn and windIO.
 
 use super::folder::{Folder, last_line, status};
-use crate::failures::frequencies;
+use crate::scenes::frequencies;
 use crate::scenes::simulate;
 use beamsim::import::{abaqus_deck, blade_deck, read_abaqus, read_blade, read_driver, read_windio};
 use std::fs;

@@ -2,7 +2,7 @@
 //! the loads at the initial places.
 
 use crate::random::Random;
-use crate::scenes::{Simulation, simulate};
+use crate::scenes::{Simulation, list, simulate};
 use beamsim::scene::{self, Scene};
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::kernel::law::{Strain, Stress};
@@ -31,11 +31,6 @@ impl Cantilever {
             "{sections}[[beam]]\nname = \"b\"\n{beam}[[support]]\nat = \"b@start\"\nfix = \"all\"\n{rest}{STATIC}{LINEAR}"
         )
     }
-}
-
-fn list(v: Vec3) -> String {
-    let [x, y, z] = v.0;
-    format!("[{x:?}, {y:?}, {z:?}]")
 }
 
 /// A section with a full 6x6 stiffness.

@@ -1,35 +1,8 @@
 //! Modes against closed forms.
 
 use crate::random::Random;
-use beamsim::scene;
-use beamsim_core::run::{Failure, Mode, Observer, Run, Snapshot, StageResult};
+use crate::scenes::{list, modes};
 use beamsim_core::tensor::Vec3;
-
-/// The modes of the last modal stage.
-#[derive(Default)]
-struct Modes(Vec<Mode>);
-
-impl Observer for Modes {
-    fn row(&mut self, _snapshot: &Snapshot) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
-        if let StageResult::Modes(modes) = result {
-            self.0.clone_from(modes);
-        }
-        Ok(())
-    }
-}
-
-/// Those of a deck that must finish.
-pub fn modes(text: &str) -> Vec<Mode> {
-    let (scene, _) = scene::from_text(text).unwrap_or_else(|found| panic!("{}\n{text}", found[0].message));
-    let mut found = Modes::default();
-    let (result, _) = Run::new(scene.plan, &mut found).finish();
-    assert!(result.is_ok(), "{result:?}\n{text}");
-    found.0
-}
 
 /// A body on a hinge with a spring and a damper, in a frame that turns about an axis beside the hinge.
 struct Hinged {
@@ -62,16 +35,15 @@ impl Hinged {
 
     fn deck(&self, axis: Vec3, outward: Vec3) -> String {
         let Self { mass, inertia, arm, stiffness, damping, frame: [aside, spin] } = *self;
-        let vector = |v: Vec3| format!("[{}, {}, {}]", v.0[0], v.0[1], v.0[2]);
-        let frame = format!("frame = {{ spin = {} }}", vector(axis * spin));
+        let frame = format!("frame = {{ spin = {} }}", list(axis * spin));
         format!(
             "[point]\np = {}\n[[body]]\nat = \"p\"\nmass = {mass}\ninertia = [{inertia}, {inertia}, {inertia}]\n\
              [[joint]]\nkind = \"revolute\"\nnodes = [\"p\"]\nat = {}\naxis = {}\nstiffness = {stiffness}\n\
              damping = {damping}\n[[stage]]\nkind = \"static\"\nsteps = 2\n{frame}\n[[stage]]\nkind = \"modal\"\n\
              modes = 1\n{frame}\n",
-            vector(outward * (aside + arm)),
-            vector(outward * aside),
-            vector(axis)
+            list(outward * (aside + arm)),
+            list(outward * aside),
+            list(axis)
         )
     }
 }

@@ -1,6 +1,6 @@
 //! Sections whose origin lies beside the line of the beam: stiffness and mass move and turn together.
 
-use crate::failures::frequencies;
+use crate::scenes::frequencies;
 
 /// A clamped, coupled, heavy arm; `beam` says how its section lies.
 fn arm(beam: &str) -> String {

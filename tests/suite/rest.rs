@@ -1,7 +1,7 @@
 //! States of rest that no load level leads to: of what only its loads hold, and of what is laid loosely.
 
 use crate::random::Random;
-use crate::scenes::{attempt, simulate};
+use crate::scenes::{attempt, modes, simulate};
 use beamsim_core::rotation::Rotation;
 use beamsim_core::run::StabilityVerdict;
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -239,14 +239,14 @@ fn a_chain_at_rest_swings_and_its_spins_are_exact_zeros() {
     let mut random = Random::new(5);
     let chain = Chain { links: 6, length: 1.0, weight: 10.0, stiffness: 1e6, span: 3.5, rise: 0.6 };
     let frame = Rotation::new(random.vector(1.0)).r;
-    let modes = |inertia: &str| {
+    let with_inertia = |inertia: &str| {
         let deck = chain
             .deck(frame, 0.3, false, 1)
             .replace("[[beam]]\nname = \"l0\"", &format!("{inertia}[[beam]]\nname = \"l0\""));
         let deck = deck.replace("[output]", "[[stage]]\nkind = \"modal\"\nmodes = 10\n[output]");
-        crate::modes::modes(&deck)
+        modes(&deck)
     };
-    let (spinning, plain) = (modes("rhoJ = [2e-3, 1e-3, 1e-3]\n"), modes(""));
+    let (spinning, plain) = (with_inertia("rhoJ = [2e-3, 1e-3, 1e-3]\n"), with_inertia(""));
     assert!(spinning[..6].iter().all(|mode| mode.size() == 0.0), "{spinning:?}");
     for (with, without) in spinning[6..10].iter().zip(&plain) {
         assert!(with.growth == 0.0 && (with.omega / without.omega - 1.0).abs() < 0.02, "{spinning:?} {plain:?}");

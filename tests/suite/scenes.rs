@@ -2,7 +2,8 @@
 
 use beamsim::scene;
 use beamsim_core::probe::Probe;
-use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot};
+use beamsim_core::run::{Counters, Failure, Mode, Observer, Run, Snapshot, StageResult};
+use beamsim_core::tensor::Vec3;
 
 /// A run with all its rows.
 pub struct Simulation {
@@ -26,6 +27,50 @@ impl Observer for Collector {
         self.rows.push(row);
         Ok(())
     }
+}
+
+/// Keeps what modal and buckling stages find.
+#[derive(Default)]
+struct Results(Vec<StageResult>);
+
+impl Observer for Results {
+    fn row(&mut self, _snapshot: &Snapshot) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
+        self.0.push(result.clone());
+        Ok(())
+    }
+}
+
+/// What the modal and buckling stages of a deck find, which must finish.
+pub fn results(text: &str) -> Vec<StageResult> {
+    let (scene, _) = scene::from_text(text).unwrap_or_else(|found| panic!("{}\n{text}", found[0].message));
+    let mut found = Results::default();
+    let (result, _) = Run::new(scene.plan, &mut found).finish();
+    assert!(result.is_ok(), "{result:?}\n{text}");
+    found.0
+}
+
+/// The modes of all modal stages of a deck, which must finish.
+pub fn modes(text: &str) -> Vec<Mode> {
+    let of_stage = |result| match result {
+        StageResult::Modes(modes) => modes,
+        StageResult::CriticalLoads(_) => Vec::new(),
+    };
+    results(text).into_iter().flat_map(of_stage).collect()
+}
+
+/// Their frequencies.
+pub fn frequencies(text: &str) -> Vec<f64> {
+    modes(text).iter().map(|mode| mode.omega).collect()
+}
+
+/// A vector as decks write it.
+pub fn list(v: Vec3) -> String {
+    let [x, y, z] = v.0;
+    format!("[{x:?}, {y:?}, {z:?}]")
 }
 
 /// Runs a deck, however it ends.

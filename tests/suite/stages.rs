@@ -1,6 +1,6 @@
 //! What goes through several stages: histories that belong to some of them, what jumps between them, and what cannot begin.
 
-use crate::failures::frequencies;
+use crate::scenes::frequencies;
 use crate::scenes::{attempt, refusal, simulate, warnings};
 
 /// A clamped beam.
