@@ -119,6 +119,10 @@ warning_kinds! {
     CoarseMesh: "coarse_mesh", Mesh;
     /// The estimated error of a computed section is large, or larger than `mesh` asks for.
     CoarseSection: "coarse_section", Mesh;
+    /// The stiffness is linear between two computed sections that differ much.
+    CoarseTaper: "coarse_taper", Mesh;
+    /// E and G of a material give a Poisson's ratio that no isotropic material has.
+    PoissonRatio: "poisson_ratio", Deck;
     /// Curvatures depend on the orientation of the scene.
     FrameDependence: "frame_dependence", Mesh;
     /// Round-off takes most digits of the displacements.

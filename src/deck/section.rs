@@ -2,7 +2,7 @@
 
 use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table, joined, kind_of};
-use super::section_shape::{self, ComputedSection, ComputedShape, Fibre, Shape, ShearFactor};
+use super::section_shape::{self, ComputedSection};
 use super::words::words;
 use toml::de::DeValue;
 
@@ -57,16 +57,7 @@ pub enum SectionBody {
         /// 6x6 mass
         mass: Option<[[f64; 6]; 6]>,
     },
-    /// A circle, a tube or a rectangle, and its material
-    Shaped {
-        /// Shape with its dimensions
-        shape: Shape,
-        /// Name of the material
-        material: Spanned<String>,
-        /// Shear factors along 2 and 3, if not Cowper's
-        shear_factor: Option<ShearFactor>,
-    },
-    /// A shape whose matrices are computed
+    /// A shape of which the matrices follow
     Computed(Box<ComputedSection>),
 }
 
@@ -94,7 +85,9 @@ pub(super) fn read_section<'a>(
     let body = match (by_resultants, by_matrices, by_shape) {
         (Some(_), None, None) => read_resultants(&table),
         (None, Some(_), None) => read_full(&table),
-        (None, None, Some(_)) => section_shape::read_shaped(&table, layups).map(body_of),
+        (None, None, Some(_)) => {
+            section_shape::read_shaped(&table, layups).map(|section| SectionBody::Computed(Box::new(section)))
+        }
         (None, None, None) => table.wrong(format!(
             "{} needs section stiffnesses (EA, GA, GJ, EI), or `stiffness`, or `material` and `shape`",
             table.what
@@ -132,16 +125,6 @@ fn read_probes(table: &Table) -> Option<Vec<SectionProbe>> {
     };
     let all: Vec<_> = points.entries().map(read).collect();
     all.into_iter().collect()
-}
-
-/// Circles, tubes and rectangles as they are, and all other shapes, which are computed.
-fn body_of(section: ComputedSection) -> SectionBody {
-    let ComputedSection { shape, material, reference, turn, mesh, fibre, shear_factor, .. } = &section;
-    let is_plain = reference.is_none() && *turn == 0.0 && mesh.is_none() && *fibre == Fibre::default();
-    if let (ComputedShape::Solid(shape), Some(material), true) = (shape, material, is_plain) {
-        return SectionBody::Shaped { shape: *shape, material: material.clone(), shear_factor: *shear_factor };
-    }
-    SectionBody::Computed(Box::new(section))
 }
 
 fn read_resultants(table: &Table) -> Option<SectionBody> {

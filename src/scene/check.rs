@@ -4,7 +4,8 @@ use super::compose::Composition;
 use super::contacts;
 use super::mesh::Mesh;
 use super::scheme::coefficients;
-use crate::deck::{self, Deck, Diagnostic, LoadTarget, MotionWhat, SectionBody, Spanned, StageBody};
+use super::section::{self, PlainSection, contraction};
+use crate::deck::{self, Deck, Diagnostic, Elastic, LoadTarget, MotionWhat, SectionBody, Spanned, StageBody};
 use beamsim_core::integrate::Stages;
 use beamsim_core::model::{StageSet, Support};
 use beamsim_core::system::Direction;
@@ -12,6 +13,10 @@ use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::{HashMap, HashSet};
+
+/// Part by which the stiffness of a taper may exceed that of linear dimensions without a warning: a
+/// stiffness that grows threefold
+const LARGEST_EXCESS: f64 = 0.11;
 
 /// Checks names, stages, and what a stage needs.
 pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
@@ -26,7 +31,8 @@ pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     contacts::check(deck, diagnostics);
     clocks_go_forward(deck, diagnostics);
     mass_where_needed(deck, diagnostics);
-    warn_of_coarse_sections(deck, diagnostics);
+    warn_of_sections(deck, diagnostics);
+    warn_of_coarse_tapers(deck, diagnostics);
     warn_of_equal_places(deck, diagnostics);
     refuse_idle_tables(deck, diagnostics);
     refuse_vectors_where_there_are_increments(deck, diagnostics);
@@ -67,11 +73,53 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Warns of computed sections, which beams use, whose error is large.
-fn warn_of_coarse_sections(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+/// Warns of computed sections, which beams use, whose error is large, and of their materials.
+fn warn_of_sections(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     let is_used = |name: &str| deck.beams.iter().any(|beam| beam.sections.iter().any(|own| own.value == name));
-    let used = deck.sections.iter().filter(|section| is_used(&section.name.value));
-    diagnostics.extend(used.filter_map(|section| super::computed::warning(section, deck)));
+    let used = || deck.sections.iter().filter(|section| is_used(&section.name.value));
+    diagnostics.extend(used().filter_map(|section| super::computed::warning(section, deck)));
+    let is_plain_of = |section: &deck::Section, material: &str| {
+        let plain = PlainSection::of(section, deck).ok().flatten();
+        plain.is_some_and(|plain| plain.material.value == material)
+    };
+    for material in &deck.materials {
+        let name = &material.name;
+        let Elastic::Isotropic(elastic) = material.elastic else { continue };
+        if contraction(&elastic) == elastic.poisson || !used().any(|section| is_plain_of(section, &name.value)) {
+            continue;
+        }
+        let message = format!(
+            "E and G of material `{}` give Poisson's ratio {:.3}, which no isotropic material has: sections are \
+             computed without their contraction",
+            name.value, elastic.poisson
+        );
+        let help = "this is right for timber and other materials with fibres along the beam; else check E and G";
+        diagnostics.push(Diagnostic::warning(WarningKind::PoissonRatio, message, name.span.clone()).help(help));
+    }
+}
+
+/// Warns of stiffness that is linear between two computed sections which differ much.
+fn warn_of_coarse_tapers(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    let section = |name: &Spanned<String>| deck.sections.iter().find(|section| section.name.value == name.value);
+    for beam in &deck.beams {
+        let excess = |pair: &[Spanned<String>]| {
+            let ends = [section(&pair[0])?, section(&pair[1])?];
+            Some((section::excess_of_taper(ends, deck)?, ends.map(|section| &section.name.value)))
+        };
+        let all = beam.sections.windows(2).filter_map(excess);
+        let Some((excess, [first, second])) = all.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+        if excess <= LARGEST_EXCESS {
+            continue;
+        }
+        let message = format!(
+            "the stiffness of beam `{}` varies linearly between the sections `{first}` and `{second}`, which differ \
+             much: if their dimensions vary linearly, it is up to {:.0} % too large there",
+            beam.name.value,
+            100.0 * excess
+        );
+        let help = "give sections in between, with `stations`";
+        diagnostics.push(Diagnostic::warning(WarningKind::CoarseTaper, message, beam.name.span.clone()).help(help));
+    }
 }
 
 /// Inertia and gravity need mass: of beams, or of bodies that massless beams carry.
@@ -115,13 +163,10 @@ fn missing_mass(deck: &Deck, section: &deck::Section) -> Option<Missing> {
     match &section.body {
         SectionBody::Resultants { mass: None, .. } => Some(Missing { key: "`rhoA`", zero: "`rhoA = 0`" }),
         SectionBody::Full { mass: None, .. } => Some(Missing { key: "`mass`", zero: "a `mass` of zeros" }),
-        SectionBody::Shaped { material, .. } => {
-            let material = deck.materials.iter().find(|m| m.name.value == material.value)?;
-            material.density.is_none().then_some(Missing { key: "a material with `rho`", zero: "`rho = 0`" })
-        }
         SectionBody::Computed(body) => {
             let without = !super::computed::has_density(body, deck);
-            without.then_some(Missing { key: "materials with `rho`", zero: "`rho = 0`" })
+            let key = if body.plain().is_some() { "a material with `rho`" } else { "materials with `rho`" };
+            without.then_some(Missing { key, zero: "`rho = 0`" })
         }
         SectionBody::Resultants { mass: Some(_), .. } | SectionBody::Full { mass: Some(_), .. } => None,
     }

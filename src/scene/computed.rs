@@ -2,7 +2,7 @@
 //! solution, which is kept for the whole process, and matrices about the line of the beam.
 
 use super::names;
-use super::section::{self, Closed};
+use super::section::{self, Closed, PlainSection};
 use crate::deck::{
     self, ComputedSection, ComputedShape, Deck, Diagnostic, Elastic, Fibre, Reference, ReferenceWord, SectionBody,
     Shape, Span, Spanned, ThetaSenseWord, WallPlies, WallSideWord,
@@ -73,22 +73,19 @@ struct Draft<'d> {
 pub fn solved(section: &deck::Section, deck: &Deck) -> Option<Result<SolvedSection, Diagnostic>> {
     match &section.body {
         SectionBody::Resultants { .. } | SectionBody::Full { .. } => None,
-        SectionBody::Shaped { shape, material, shear_factor } => {
-            let body = ComputedSection::of_shape(*shape, material.clone(), *shear_factor);
-            Some(solve(section, &body, deck))
-        }
         SectionBody::Computed(body) => Some(solve(section, body, deck)),
     }
 }
 
 /// Computes a section.
-fn solve(section: &deck::Section, body: &ComputedSection, deck: &Deck) -> Result<SolvedSection, Diagnostic> {
+pub fn solve(section: &deck::Section, body: &ComputedSection, deck: &Deck) -> Result<SolvedSection, Diagnostic> {
+    if let Some(plain) = PlainSection::of(section, deck)? {
+        let matrices = section::within_range(plain.matrices(), section)?;
+        return Ok(SolvedSection { solution: None, place: plain.place, matrices, compliance: None });
+    }
     let near = far_middle(&body.shape).map(|origin| (origin, near_origin(body, origin)));
     let (origin, body) = near.as_ref().map_or(([0.0; 2], body), |(origin, near)| (*origin, near));
     let mut draft = Draft { deck, section, body, materials: Vec::new(), regions: Vec::new() };
-    if let Some(closed) = draft.closed_form()? {
-        return Ok(draft.placed(None, closed));
-    }
     if let Some(deck::ShearFactor::Given(_)) = body.shear_factor {
         let message = format!(
             "section `{}` is computed by finite elements, which find the shear stiffness: remove `shear_factor`",
@@ -104,17 +101,16 @@ fn solve(section: &deck::Section, body: &ComputedSection, deck: &Deck) -> Result
         Some(deck::MeshAim::Size(size)) => MeshAim::Size(size),
     };
     let analysis = kept(&geometry, &draft.materials, aim).map_err(|error| draft.explain(&error.moved(origin)))?;
-    let closed = Closed { stiffness: analysis.solution.stiffness, mass: analysis.solution.mass };
+    let own = Closed { stiffness: analysis.solution.stiffness, mass: analysis.solution.mass };
     let place = draft.place(&analysis);
-    let compliance = moved_compliance(&analysis.solution.compliance, place);
-    let solution = Solution { analysis, materials: draft.materials.clone(), origin };
-    let mut found = draft.placed(Some((solution, place)), closed);
-    if near.is_some() {
-        found.place = [place[0] + origin[0], place[1] + origin[1]];
-        found.compliance = Some(turned(&compliance, -body.turn));
-    }
-    section::within_range(found.matrices.clone(), section)?;
-    Ok(found)
+    let matrices = section::within_range(about_line(&own, place, body.turn, has_density(body, deck)), section)?;
+    let compliance = near.is_some().then(|| {
+        let compliance = moved_compliance(&analysis.solution.compliance, place);
+        turned(&compliance, -body.turn)
+    });
+    let place = [place[0] + origin[0], place[1] + origin[1]];
+    let solution = Some(Solution { analysis, materials: draft.materials, origin });
+    Ok(SolvedSection { solution, place, matrices, compliance })
 }
 
 /// A warning about a section whose error is large, or larger than it was to be.
@@ -170,20 +166,6 @@ fn kept(geometry: &Geometry, materials: &[Material], aim: MeshAim) -> Result<Arc
 }
 
 impl Draft<'_> {
-    /// Circles, tubes and rectangles of an isotropic material, without a wanted mesh.
-    fn closed_form(&self) -> Result<Option<Closed>, Diagnostic> {
-        let (ComputedShape::Solid(shape), Some(material), None) =
-            (&self.body.shape, &self.body.material, self.body.mesh)
-        else {
-            return Ok(None);
-        };
-        let material = section::find_material(material, &self.deck.materials)?;
-        let Elastic::Isotropic(elastic) = material.elastic else { return Ok(None) };
-        let found = section::shaped(*shape, elastic, material.density, self.body.shear_factor);
-        let found = section::within_range(found, self.section)?;
-        Ok(Some(Closed::of(&found)))
-    }
-
     /// The reference point in the coordinates of the shape.
     fn place(&self, analysis: &Analysis) -> Point {
         let reference = match self.body.reference {
@@ -202,25 +184,6 @@ impl Draft<'_> {
         // A centre on an axis of the shape is there exactly.
         let round_off = NO_COUPLING * analysis.solution.area.sqrt();
         analysis.place(reference).map(|x| if x.abs() <= round_off { 0.0 } else { x })
-    }
-
-    /// Matrices about the line of the beam, in its axes.
-    fn placed(&self, solution: Option<(Solution, Point)>, own: Closed) -> SolvedSection {
-        let place = match (&solution, self.body.reference) {
-            (Some((_, place)), _) => *place,
-            (None, Some(Reference::Point(at))) => at,
-            // All centres of closed forms are their middle.
-            (None, Some(Reference::Word(_)) | None) => [0.0; 2],
-        };
-        // Axes see a section turned by an angle as turned axes see the other way round.
-        let in_axes = |matrix: &Matrix6| without_round_off(&turned(&moved(matrix, place), -self.body.turn));
-        let stiffness = in_axes(&own.stiffness);
-        let mass = in_axes(&own.mass);
-        let matrices = SectionMatrices {
-            stiffness: std::array::from_fn(|i| std::array::from_fn(|j| stiffness[(i, j)])),
-            mass: has_density(self.body, self.deck).then(|| mass_per_length(&mass)),
-        };
-        SolvedSection { solution: solution.map(|(solution, _)| solution), place, matrices, compliance: None }
     }
 
     /// The index of a material among those of the section.
@@ -462,6 +425,19 @@ impl Draft<'_> {
             | SectionError::Singular
             | SectionError::Interrupted => Diagnostic::error(message, span),
         }
+    }
+}
+
+/// Matrices about the line of the beam, in its axes: the line goes through `place` of the shape, which
+/// is turned about it by `turn` from axis 2 towards axis 3.
+pub fn about_line(own: &Closed, place: Point, turn: f64, has_mass: bool) -> SectionMatrices {
+    // Axes see a section turned by an angle as turned axes see the other way round.
+    let in_axes = |matrix: &Matrix6| without_round_off(&turned(&moved(matrix, place), -turn));
+    let stiffness = in_axes(&own.stiffness);
+    let mass = in_axes(&own.mass);
+    SectionMatrices {
+        stiffness: std::array::from_fn(|i| std::array::from_fn(|j| stiffness[(i, j)])),
+        mass: has_mass.then(|| mass_per_length(&mass)),
     }
 }
 

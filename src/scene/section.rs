@@ -3,8 +3,8 @@
 use super::along::Along;
 use super::computed;
 use crate::deck::{
-    self, Deck, Diagnostic, EffectWord, Effects, Elastic, Isotropic, SectionBody, Shape, ShearFactor, Span, Spanned,
-    StationsWord,
+    self, Deck, Diagnostic, EffectWord, Effects, Elastic, Isotropic, Reference, SectionBody, Shape, ShearFactor, Span,
+    Spanned, StationsWord,
 };
 use beamsim_core::kernel::inertia::Inertia;
 use beamsim_core::model::beam_element::body_inertia;
@@ -20,16 +20,7 @@ pub enum SectionCourse {
     /// One section
     Uniform(SectionMatrices),
     /// Dimensions linear in arc length
-    Shaped {
-        /// At start and end
-        shapes: [Shape; 2],
-        /// The material of both
-        material: Isotropic,
-        /// Its density, where given
-        density: Option<f64>,
-        /// Shear factors of both, where given
-        shear_factors: [Option<ShearFactor>; 2],
-    },
+    Shaped(Box<Taper>),
     /// Each entry linear in arc length
     Blended([SectionMatrices; 2]),
     /// From station to station
@@ -64,6 +55,9 @@ const TORSION: usize = 3;
 /// Couplings below this part of the geometric mean of both stiffnesses are round-off.
 const ROUND_OFF: f64 = 1e-9;
 
+/// Poisson's ratio of an incompressible material, and some round-off of E/(2G) - 1
+const LARGEST_POISSON: f64 = 0.5 + 1e-9;
+
 /// Relative difference of lengths in tables and of beams that is taken for rounding.
 const SAME_LENGTH: f64 = 1e-3;
 
@@ -72,16 +66,7 @@ impl SectionCourse {
     pub fn at(&self, s: f64) -> SectionMatrices {
         match self {
             Self::Uniform(section) => section.clone(),
-            Self::Shaped { shapes, material, density, shear_factors } => {
-                let shape = blend_shapes(shapes, s);
-                let factor = match shear_factors {
-                    [Some(ShearFactor::Given(a)), Some(ShearFactor::Given(b))] => {
-                        Some(ShearFactor::Given([0, 1].map(|k| mix(a[k], b[k], s))))
-                    }
-                    [one, other] => one.or(*other),
-                };
-                shaped(shape, *material, *density, factor)
-            }
+            Self::Shaped(taper) => taper.at(s).matrices(),
             Self::Blended([a, b]) => blend(a, b, s),
             Self::Stations { fractions, courses } => {
                 let next = fractions.partition_point(|&station| station <= s).clamp(1, courses.len());
@@ -108,7 +93,7 @@ impl SectionCourse {
         match self {
             Self::Stations { courses, .. } => courses.iter().any(Self::couples_torsion),
             Self::Uncoupled(course) | Self::Rigid(course, _) => course.couples_torsion(),
-            Self::Uniform(_) | Self::Shaped { .. } | Self::Blended(_) | Self::Placed { .. } => {
+            Self::Uniform(_) | Self::Shaped(_) | Self::Blended(_) | Self::Placed { .. } => {
                 [0.0, 1.0].into_iter().any(|s| couples_torsion(&self.at(s).stiffness))
             }
         }
@@ -213,9 +198,13 @@ fn mix(a: f64, b: f64, s: f64) -> f64 {
     a + (b - a) * s
 }
 
+fn mix_each(a: [f64; 2], b: [f64; 2], s: f64) -> [f64; 2] {
+    [0, 1].map(|k| mix(a[k], b[k], s))
+}
+
 /// The shape between two of one kind, with dimensions linear along the way.
-pub fn blend_shapes(shapes: &[Shape; 2], s: f64) -> Shape {
-    match (shapes[0], shapes[1]) {
+fn blend_shapes([a, b]: [Shape; 2], s: f64) -> Shape {
+    match (a, b) {
         (Shape::Circle { radius: a }, Shape::Circle { radius: b }) => Shape::Circle { radius: mix(a, b, s) },
         (Shape::Tube { radius: a, thickness: ta }, Shape::Tube { radius: b, thickness: tb }) => {
             Shape::Tube { radius: mix(a, b, s), thickness: mix(ta, tb, s) }
@@ -256,24 +245,91 @@ pub fn matrices(section: &deck::Section, deck: &Deck) -> Result<SectionMatrices,
             Ok(SectionMatrices { mass, ..SectionMatrices::diagonal(*stiffness) })
         }
         SectionBody::Full { stiffness, mass } => full(section, stiffness, mass.as_ref(), span),
-        SectionBody::Shaped { shape, material, shear_factor } => {
-            let found = find_material(material, &deck.materials)?;
-            match found.elastic {
-                Elastic::Isotropic(elastic) => {
-                    within_range(shaped(*shape, elastic, found.density, *shear_factor), section)
-                }
-                Elastic::Orthotropic { .. } => of_shape(section, deck),
-            }
-        }
-        SectionBody::Computed(_) => of_shape(section, deck),
+        SectionBody::Computed(body) => Ok(computed::solve(section, body, deck)?.matrices),
     }
 }
 
-/// The matrices of a section that is computed from its shape.
-fn of_shape(section: &deck::Section, deck: &Deck) -> Result<SectionMatrices, Diagnostic> {
-    match computed::solved(section, deck) {
-        Some(solved) => Ok(solved?.matrices),
-        None => Err(Diagnostic::error("a section without a shape", section.name.span.clone())),
+/// A circle, tube or rectangle of an isotropic material: its matrices and stresses have closed forms.
+#[derive(Clone, Debug)]
+pub struct PlainSection {
+    /// Shape and dimensions
+    pub(super) shape: Shape,
+    /// Name of the material
+    pub(super) material: Spanned<String>,
+    /// Constants of the material, with Poisson's ratio as [`contraction`] has it
+    pub(super) elastic: Isotropic,
+    /// Density, where given
+    density: Option<f64>,
+    /// Shear factors along 2 and 3, if not Cowper's
+    shear_factor: Option<ShearFactor>,
+    /// The point of the shape through which the line of the beam goes
+    pub(super) place: [f64; 2],
+    /// Turn of the shape about the line of the beam, from axis 2 towards axis 3, rad
+    pub(super) turn: f64,
+}
+
+impl PlainSection {
+    /// A section that has closed forms; `None` for others.
+    pub fn of(section: &deck::Section, deck: &Deck) -> Result<Option<Self>, Diagnostic> {
+        let SectionBody::Computed(body) = &section.body else { return Ok(None) };
+        let Some((shape, material)) = body.plain() else { return Ok(None) };
+        let found = find_material(material, &deck.materials)?;
+        let Elastic::Isotropic(elastic) = found.elastic else { return Ok(None) };
+        let elastic = Isotropic { poisson: contraction(&elastic), ..elastic };
+        let deck::ComputedSection { shear_factor, turn, .. } = **body;
+        // All centres of these shapes are their middle.
+        let place = match body.reference {
+            Some(Reference::Point(at)) => at,
+            Some(Reference::Word(_)) | None => [0.0; 2],
+        };
+        let (material, density) = (material.clone(), found.density);
+        Ok(Some(Self { shape, material, elastic, density, shear_factor, place, turn }))
+    }
+
+    /// Stiffness and mass about the line of the beam.
+    pub fn matrices(&self) -> SectionMatrices {
+        let own = shaped(self.shape, self.elastic, self.density, self.shear_factor);
+        if self.place == [0.0; 2] && self.turn == 0.0 {
+            return own;
+        }
+        computed::about_line(&Closed::of(&own), self.place, self.turn, own.mass.is_some())
+    }
+}
+
+/// Two sections with closed forms, of one kind of shape and one material: between them dimensions,
+/// place and turn are linear.
+#[derive(Clone, Debug)]
+pub struct Taper {
+    ends: [PlainSection; 2],
+}
+
+impl Taper {
+    /// Between two sections of the deck; `None` where the sections between have no closed form.
+    pub fn new(ends: [&deck::Section; 2], deck: &Deck) -> Result<Option<Self>, Diagnostic> {
+        let [Some(a), Some(b)] = [PlainSection::of(ends[0], deck)?, PlainSection::of(ends[1], deck)?] else {
+            return Ok(None);
+        };
+        let factors_alike = match (a.shear_factor, b.shear_factor) {
+            (None, None)
+            | (Some(ShearFactor::Energy), Some(ShearFactor::Energy))
+            | (Some(ShearFactor::Given(_)), Some(ShearFactor::Given(_))) => true,
+            (None | Some(_), None | Some(_)) => false,
+        };
+        let alike = std::mem::discriminant(&a.shape) == std::mem::discriminant(&b.shape)
+            && a.material.value == b.material.value;
+        Ok((alike && factors_alike).then(|| Self { ends: [a, b] }))
+    }
+
+    /// The section at a part of the way.
+    pub fn at(&self, s: f64) -> PlainSection {
+        let [a, b] = &self.ends;
+        let shear_factor = match (a.shear_factor, b.shear_factor) {
+            (Some(ShearFactor::Given(a)), Some(ShearFactor::Given(b))) => Some(ShearFactor::Given(mix_each(a, b, s))),
+            (one, other) => one.or(other),
+        };
+        let place = mix_each(a.place, b.place, s);
+        let turn = mix(a.turn, b.turn, s);
+        PlainSection { shape: blend_shapes([a.shape, b.shape], s), shear_factor, place, turn, ..a.clone() }
     }
 }
 
@@ -293,23 +349,35 @@ pub fn within_range(found: SectionMatrices, section: &deck::Section) -> Result<S
 
 /// The course of a taper between two sections.
 pub fn taper(ends: [&deck::Section; 2], deck: &Deck) -> Result<SectionCourse, Diagnostic> {
-    if let [
-        SectionBody::Shaped { shape: a, material: ma, shear_factor: fa },
-        SectionBody::Shaped { shape: b, material: mb, shear_factor: fb },
-    ] = ends.map(|section| &section.body)
-    {
-        let alike = std::mem::discriminant(a) == std::mem::discriminant(b) && ma.value == mb.value;
-        let found = find_material(ma, &deck.materials)?;
-        let factors_alike = fa.map(|factor| std::mem::discriminant(&factor)) == fb.map(|f| std::mem::discriminant(&f));
-        if let (true, true, Elastic::Isotropic(material)) = (alike, factors_alike, found.elastic) {
-            // Between the ends nothing is larger, or smaller, than at both.
-            matrices(ends[0], deck)?;
-            matrices(ends[1], deck)?;
-            let density = found.density;
-            return Ok(SectionCourse::Shaped { shapes: [*a, *b], material, density, shear_factors: [*fa, *fb] });
-        }
+    // Between the ends nothing is larger, or smaller, than at both.
+    let matrices = [matrices(ends[0], deck)?, matrices(ends[1], deck)?];
+    Ok(match Taper::new(ends, deck)? {
+        Some(taper) => SectionCourse::Shaped(Box::new(taper)),
+        None => SectionCourse::Blended(matrices),
+    })
+}
+
+/// The part by which a stiffness that is linear between two computed sections would exceed that of
+/// linear dimensions in the middle, where it grows with their fourth power; `None` where it is not
+/// linear, or where it was given in numbers.
+pub fn excess_of_taper(ends: [&deck::Section; 2], deck: &Deck) -> Option<f64> {
+    let is_computed = |section: &&deck::Section| matches!(section.body, SectionBody::Computed(_));
+    if !ends.iter().all(is_computed) || Taper::new(ends, deck).ok()?.is_some() {
+        return None;
     }
-    Ok(SectionCourse::Blended([matrices(ends[0], deck)?, matrices(ends[1], deck)?]))
+    let [a, b] = [matrices(ends[0], deck).ok()?, matrices(ends[1], deck).ok()?];
+    let excess = |k: usize| {
+        let ratio = b.stiffness[k][k] / a.stiffness[k][k];
+        0.5 * (1.0 + ratio) / fourth(0.5 * (1.0 + libm::pow(ratio, 0.25))) - 1.0
+    };
+    (0..6).map(excess).max_by(f64::total_cmp)
+}
+
+/// Poisson's ratio of a material in sections with closed forms. E and G of materials that are not
+/// isotropic, such as timber along its grain, give one that is impossible: their fibres hinder the
+/// contraction of the section, which is left out.
+pub fn contraction(elastic: &Isotropic) -> f64 {
+    if elastic.poisson <= LARGEST_POISSON { elastic.poisson } else { 0.0 }
 }
 
 /// The material with this name.
@@ -371,7 +439,7 @@ fn mass_properties(matrix: &[[f64; 6]; 6]) -> Result<MassPerLength, String> {
 }
 
 /// EA, GA with Cowper's (1966) shear factors, GJ with Saint-Venant torsion, EI.
-pub fn shaped(
+fn shaped(
     shape: Shape,
     material: Isotropic,
     density: Option<f64>,

@@ -3,12 +3,9 @@
 use super::computed::{self, Solution, SolvedSection};
 use super::figure::SectionsAtNodes;
 use super::mesh::{Mesh, MeshBeam};
-use super::section::{blend_shapes, find_material};
+use super::section::{PlainSection, Taper, find_material};
 use super::{names, path};
-use crate::deck::{
-    self, Beam, ComputedSection, ComputedShape, CornerWord, Deck, Diagnostic, Elastic, SectionBody, Shape, Span,
-    Spanned, Strength,
-};
+use crate::deck::{self, Beam, CornerWord, Deck, Diagnostic, SectionBody, Shape, Span, Spanned, Strength};
 use beamsim_core::section::closed::{ClosedForm, ClosedShape};
 use beamsim_core::section::material::Material;
 use beamsim_core::section::mesh::Region;
@@ -152,19 +149,9 @@ impl<'d> SectionStresses<'d> {
         span: &Span,
     ) -> Result<Arc<Recovery>, Diagnostic> {
         let [first, second] = ends;
-        if let (
-            SectionBody::Shaped { shape: a, material, .. },
-            SectionBody::Shaped { shape: b, material: of_second, .. },
-        ) = (&first.body, &second.body)
-        {
-            let found = find_material(material, &self.deck.materials)?;
-            let is_alike = std::mem::discriminant(a) == std::mem::discriminant(b) && material.value == of_second.value;
-            if let (true, Elastic::Isotropic(elastic)) = (is_alike, found.elastic) {
-                let form = closed_form(&blend_shapes(&[*a, *b], along), elastic.poisson);
-                let law = failure_law(found);
-                let name = format!("{}-{}", first.name.value, second.name.value);
-                return Ok(Arc::new(Recovery::closed(&name, form, Placement::default(), law)));
-            }
+        if let Some(taper) = Taper::new(ends, self.deck)? {
+            let name = format!("{}-{}", first.name.value, second.name.value);
+            return Ok(Arc::new(closed(&name, &taper.at(along), self.deck)?));
         }
         for section in ends {
             self.of_section(section, span)?;
@@ -250,16 +237,15 @@ fn solved(section: &deck::Section, deck: &Deck, span: &Span) -> Result<SolvedSec
 pub fn recovery(section: &deck::Section, deck: &Deck, span: &Span) -> Result<Recovery, Diagnostic> {
     let SolvedSection { solution, place, .. } = solved(section, deck, span)?;
     let name = &section.name.value;
-    let turn = match &section.body {
-        SectionBody::Computed(body) => body.turn,
-        SectionBody::Shaped { .. } | SectionBody::Resultants { .. } | SectionBody::Full { .. } => 0.0,
-    };
-    let Some(Solution { analysis, materials, origin }) = solution else {
-        let (form, law) = closed(section, deck)?;
-        return Ok(Recovery::closed(name, form, Placement { line: place, turn, origin: [0.0; 2] }, law));
+    if let Some(plain) = PlainSection::of(section, deck)? {
+        return closed(name, &plain, deck);
+    }
+    let (SectionBody::Computed(body), Some(Solution { analysis, materials, origin })) = (&section.body, solution)
+    else {
+        return Err(Diagnostic::error("a section without a solution", section.name.span.clone()));
     };
     let line = [place[0] - origin[0], place[1] - origin[1]];
-    let placement = Placement { line, turn, origin };
+    let placement = Placement { line, turn: body.turn, origin };
     let law = |material: &Material| {
         let of_deck = deck.materials.iter().find(|known| known.name.value == material.name)?;
         failure_law(of_deck)
@@ -277,37 +263,17 @@ fn broken(section: &deck::Section, error: &beamsim_core::section::SectionError, 
     Diagnostic::error(format!("section `{}`: {error}", section.name.value), span.clone())
 }
 
-/// The closed form of a circle, tube or rectangle, with the law of its material.
-fn closed(section: &deck::Section, deck: &Deck) -> Result<(ClosedForm, Option<FailureLaw>), Diagnostic> {
-    let of_body = |shape: &Shape, material: &deck::Spanned<String>| {
-        let found = find_material(material, &deck.materials)?;
-        let poisson = match found.elastic {
-            Elastic::Isotropic(elastic) => elastic.poisson,
-            Elastic::Orthotropic { .. } => 0.0,
-        };
-        Ok((closed_form(shape, poisson), failure_law(found)))
-    };
-    match &section.body {
-        SectionBody::Shaped { shape, material, .. } => of_body(shape, material),
-        SectionBody::Computed(body) => {
-            let ComputedSection { shape: ComputedShape::Solid(shape), material: Some(material), .. } = &**body else {
-                return Err(Diagnostic::error("a section without a closed form", section.name.span.clone()));
-            };
-            of_body(shape, material)
-        }
-        SectionBody::Resultants { .. } | SectionBody::Full { .. } => {
-            Err(Diagnostic::error("a section without a shape", section.name.span.clone()))
-        }
-    }
-}
-
-fn closed_form(shape: &Shape, nu: f64) -> ClosedForm {
-    let shape = match *shape {
+/// The stresses of a section that has closed forms.
+fn closed(name: &str, plain: &PlainSection, deck: &Deck) -> Result<Recovery, Diagnostic> {
+    let law = failure_law(find_material(&plain.material, &deck.materials)?);
+    let shape = match plain.shape {
         Shape::Circle { radius } => ClosedShape::Ring { radii: [0.0, radius] },
         Shape::Tube { radius, thickness } => ClosedShape::Ring { radii: [radius - thickness, radius] },
         Shape::Rectangle { width, height } => ClosedShape::Rectangle { half: [0.5 * width, 0.5 * height] },
     };
-    ClosedForm::new(shape, nu)
+    let form = ClosedForm::new(shape, plain.elastic.poisson);
+    let placement = Placement { line: plain.place, turn: plain.turn, origin: [0.0; 2] };
+    Ok(Recovery::closed(name, form, placement, law))
 }
 
 /// The law of a material that has strengths.

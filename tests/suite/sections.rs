@@ -1,5 +1,6 @@
 //! Sections by shape, as decks give them: the reference sections of `core/tests/section`, and what only decks say.
 
+use super::scenes::{simulate, warnings};
 use beamsim::deck::{self, Deck};
 use beamsim::scene;
 use beamsim_core::model::SectionMatrices;
@@ -292,4 +293,139 @@ fn sections_far_from_their_origin_keep_their_digits() {
     let (place, centred) = properties(1e6, "reference = \"centroid\"");
     assert!((0..2).all(|axis| (place[axis] - [1e6 + 10.0, 1e6 + 5.0][axis]).abs() < 1e-5), "{place:?}");
     assert!((centred.ea / 200.0 - 1.0).abs() < 1e-9 && (centred.ga[0] / near.ga[0] - 1.0).abs() < 1e-3, "{centred:?}");
+}
+
+/// A cantilever whose section varies between the two that are given, with a beam table of its own.
+fn tapered(ends: [&str; 2], beam: &str) -> String {
+    let [first, second] = ends;
+    format!(
+        "[material.m]\nE = 1000\nnu = 0.3\nrho = 2\n[section.a]\nmaterial = \"m\"\n{first}\n[section.b]\nmaterial = \"m\"\n\
+         {second}\n[point]\nroot = [0, 0, 0]\ntip = [3, 0, 0]\n[[beam]]\nname = \"b\"\nsection = [\"a\", \"b\"]\n\
+         through = [\"root\", \"tip\"]\nelements = 3\norder = 2\n{beam}\n[[support]]\nat = \"root\"\nfix = \"all\"\n\
+         [[load]]\nat = \"tip\"\nforce = [0.01, 0.02, -0.03]\nmoment = [0.02, 0, 0]\n\
+         [[stage]]\nkind = \"static\"\nsteps = 1\n[output]\n"
+    )
+}
+
+#[test]
+fn a_taper_of_placed_sections_is_that_of_a_placed_beam() {
+    let shapes = [
+        ["shape = \"circle\"\nradius = 0.2", "shape = \"circle\"\nradius = 0.1"],
+        [
+            "shape = \"tube\"\nradius = 0.1\nthickness = 0.02\nshear_factor = \"energy\"",
+            "shape = \"tube\"\nradius = 0.3\nthickness = 0.01\nshear_factor = \"energy\"",
+        ],
+        [
+            "shape = \"rectangle\"\nwidth = 0.1\nheight = 0.3\nshear_factor = [0.8, 0.9]",
+            "shape = \"rectangle\"\nwidth = 0.2\nheight = 0.1\nshear_factor = [0.7, 0.6]",
+        ],
+    ];
+    for shape in shapes {
+        for (turn, [a, b]) in [(0.4, [[0.0; 2]; 2]), (-1.1, [[0.1, -0.05], [0.02, 0.2]])] {
+            let of_section = |shape: &str, at: [f64; 2]| format!("{shape}\nturn = {turn:?}\nreference = {at:?}");
+            let by_sections = tapered([&of_section(shape[0], a), &of_section(shape[1], b)], "");
+            // The middle lies beside the line by -reference, in axes that turn with the section.
+            let (sin, cos) = f64::sin_cos(turn);
+            let offset = |[x, y]: [f64; 2]| [-(cos * x - sin * y), -(sin * x + cos * y)];
+            let (oa, ob) = (offset(a), offset(b));
+            let by_beam = tapered(shape, &format!("offset = [{oa:?}, {ob:?}]\nturn = {turn:?}"));
+            let [sections, beam] = [by_sections, by_beam].map(|text| {
+                simulate(&format!("{text}nodes = [\"tip\", \"b@0.3\"]\ncolumns = [\"u\", \"r\", \"stress\"]\n"))
+            });
+            assert_eq!(sections.names, beam.names);
+            for (name, (found, right)) in sections.names.iter().zip(sections.rows[1].iter().zip(&beam.rows[1])) {
+                assert!((found - right).abs() <= 1e-9 * right.abs() + 1e-12, "{name}: {found} {right}\n{shape:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn sections_without_a_shape_in_between_are_warned_of_where_they_differ_much() {
+    let square = |height: f64| format!("shape = \"rectangle\"\nwidth = 0.2\nheight = {height:?}\nmesh = 1e-2");
+    let warned = |ends: [f64; 2]| {
+        let text = tapered([&square(ends[0]), &square(ends[1])], "");
+        warnings(&text).iter().any(|message| message.contains("varies linearly between the sections"))
+    };
+    // EI grows with the third power of the height.
+    assert!(!warned([0.2, 0.25]) && !warned([0.25, 0.2]));
+    assert!(warned([0.2, 0.32]) && warned([0.32, 0.2]));
+}
+
+#[test]
+fn timber_has_no_contraction_of_its_section() {
+    let section = "[section.s]\nmaterial = \"m\"\nshape = \"circle\"\nradius = 2\n";
+    let timber = format!("[material.m]\nE = 11000\nG = 690\n{section}");
+    let plain = format!("[material.m]\nE = 11000\nnu = 0\n{section}");
+    let [of_timber, of_plain] = [stiffness(&timber), stiffness(&plain)];
+    // GA is that of the given G, with the shear factor of a material without contraction.
+    assert!((of_timber[(1, 1)] / of_plain[(1, 1)] - 690.0 / 5500.0).abs() < 1e-12);
+    let shear = Vector6::from([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+    let largest = |text: &str| stresses(text).largest(Measure::VonMises, &shear, f64::NEG_INFINITY).unwrap().value;
+    assert!((largest(&timber) / largest(&plain) - 1.0).abs() < 1e-12);
+}
+
+/// Points as decks write them, turned about the origin.
+fn turned_points(points: &[[f64; 2]], angle: f64) -> String {
+    let (sin, cos) = angle.sin_cos();
+    let point = |&[x, y]: &[f64; 2]| format!("[{:?}, {:?}]", cos * x - sin * y, sin * x + cos * y);
+    format!("[{}]", points.iter().map(point).collect::<Vec<_>>().join(", "))
+}
+
+#[test]
+fn outlines_that_share_edges_mean_what_they_enclose() {
+    let square = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
+    let rect = |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+    // Each section twice: outline and holes that share edges, and what they mean.
+    let notched =
+        vec![[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0], [0.0, 4.0], [3.0, 4.0], [3.0, 1.0], [0.0, 1.0]];
+    let spiked = vec![[0.0, 0.0], [12.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
+    // A hole that is cut into the outline along a line which is followed to and fro.
+    let mut keyhole = square.to_vec();
+    keyhole.extend([[0.0, 0.0], [3.0, 3.0], [3.0, 6.0], [6.0, 6.0], [6.0, 3.0], [3.0, 3.0]]);
+    let pairs: [[(Vec<[f64; 2]>, Vec<Vec<[f64; 2]>>); 2]; 4] = [
+        [(square.to_vec(), vec![rect([0.0, 3.0], [1.0, 4.0])]), (notched, vec![])],
+        [
+            (square.to_vec(), vec![rect([2.0, 4.0], [2.0, 5.0]), rect([4.0, 7.0], [2.0, 5.0])]),
+            (square.to_vec(), vec![rect([2.0, 7.0], [2.0, 5.0])]),
+        ],
+        [(spiked, vec![]), (square.to_vec(), vec![])],
+        [(keyhole, vec![]), (square.to_vec(), vec![rect([3.0, 6.0], [3.0, 6.0])])],
+    ];
+    for (number, pair) in pairs.iter().enumerate() {
+        for angle in [0.0, 0.3] {
+            let [shared, plain] = pair.each_ref().map(|(outline, holes)| {
+                let holes: Vec<String> = holes.iter().map(|hole| turned_points(hole, angle)).collect();
+                stiffness(&format!(
+                    "{STEEL}[section.s]\nmaterial = \"steel\"\nshape = \"polygon\"\noutline = {}\nholes = [{}]\n",
+                    turned_points(outline, angle),
+                    holes.join(", ")
+                ))
+            });
+            let error = relative_difference(&shared, &plain);
+            assert!(error < 2e-3, "{number} turned by {angle}: {error:.1e}");
+        }
+    }
+}
+
+#[test]
+fn parts_that_touch_in_a_point_are_apart_there() {
+    let square = "[[0, 0], [10, 0], [10, 10], [0, 10]]";
+    // Each section twice: with a point of contact, and with a narrow opening in its place.
+    let pairs = [
+        [
+            "[{ rect = [2, 5, 2, 5] }, { rect = [5, 8, 5, 8] }]",
+            "[[[2, 2], [5, 2], [5, 4.995], [5.005, 5], [8, 5], [8, 8], [5, 8], [5, 5.005], [4.995, 5], [2, 5]]]",
+        ],
+        ["[[[0, 5], [4, 3], [4, 7]]]", "[[[0, 4.995], [4, 3], [4, 7], [0, 5.005]]]"],
+    ];
+    for (number, pair) in pairs.iter().enumerate() {
+        let [touching, open] = pair.map(|holes| {
+            stiffness(&format!(
+                "{STEEL}[section.s]\nmaterial = \"steel\"\nshape = \"polygon\"\noutline = {square}\nholes = {holes}\n"
+            ))
+        });
+        let error = relative_difference(&touching, &open);
+        assert!(error < 4e-3, "{number}: {error:.1e}");
+    }
 }

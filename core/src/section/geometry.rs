@@ -149,6 +149,7 @@ impl Geometry {
     /// A mesh of some level (0 the coarsest), checked.
     pub fn mesh(&self, level: usize) -> Result<Mesh, SectionError> {
         let mut mesh = self.shape.mesh(Fineness::level(level))?;
+        mesh.separate_parts_at_points();
         if self.turn != 0.0 {
             mesh.turn(self.turn);
         }

@@ -151,6 +151,46 @@ impl Mesh {
         }
     }
 
+    /// Gives each part of the material a node of its own at points in which parts only touch, as
+    /// where the corner of a hole lies on the outline. A common node would hold them together by a
+    /// force in one point, which the exact solution does not have.
+    pub fn separate_parts_at_points(&mut self) {
+        let mut first_corner = Vec::with_capacity(self.elements.len());
+        let mut corners = 0;
+        for element in &self.elements {
+            first_corner.push(corners);
+            corners += element.kind.corners();
+        }
+        // Corners of elements at a node hang together by common sides.
+        let mut parts = UnionFind::new(corners);
+        let mut on_side: HashMap<[u32; 2], [usize; 2]> = HashMap::new();
+        for (element, first) in self.elements.iter().zip(&first_corner) {
+            for side in 0..element.kind.corners() {
+                let [a, b, _] = element.kind.side(side);
+                let [at_a, at_b] = [a, b].map(|local| (element.nodes[local], first + local));
+                let [low, high] = if at_a.0 < at_b.0 { [at_a, at_b] } else { [at_b, at_a] };
+                let known = *on_side.entry([low.0, high.0]).or_insert([low.1, high.1]);
+                parts.unite(known[0], low.1);
+                parts.unite(known[1], high.1);
+            }
+        }
+        let mut node_of_part: HashMap<usize, u32> = HashMap::new();
+        let mut is_taken = vec![false; self.nodes.len()];
+        for (element, first) in self.elements.iter_mut().zip(&first_corner) {
+            for local in 0..element.kind.corners() {
+                let node = element.nodes[local];
+                element.nodes[local] = *node_of_part.entry(parts.root(first + local)).or_insert_with(|| {
+                    if std::mem::replace(&mut is_taken[node as usize], true) {
+                        self.nodes.push(self.nodes[node as usize]);
+                        self.nodes.len() as u32 - 1
+                    } else {
+                        node
+                    }
+                });
+            }
+        }
+    }
+
     /// Checks that no element is folded and that the section is one piece.
     pub fn check(&self) -> Result<(), SectionError> {
         self.check_elements()?;

@@ -34,6 +34,9 @@ const MAX_AREA: f64 = 0.45;
 /// outline of short sides, with hardly a singularity.
 const CORNER_ANGLE: f64 = 0.4;
 
+/// Round-off of a sum of angles, rad
+const ROUND_OFF: f64 = 1e-9;
+
 /// Chords of an arc in the test for crossings
 const CHORDS_OF_ARC: usize = 16;
 
@@ -284,7 +287,9 @@ impl Boundaries {
                 filled.entry(at.map(f64::to_bits)).or_insert((at, 0.0)).1 += outline.interior_angle(k);
             }
         }
-        let mut corners: Vec<_> = filled.into_values().collect();
+        // About a point of a hole the material of its region counts once for each outline there.
+        let within_turn = |angle: f64| if angle > TAU + ROUND_OFF { angle.rem_euclid(TAU) } else { angle };
+        let mut corners: Vec<_> = filled.into_values().map(|(at, angle)| (at, within_turn(angle))).collect();
         corners.retain(|(_, angle)| *angle > PI + CORNER_ANGLE && *angle < TAU - CORNER_ANGLE);
         // The order of a hash map must not decide about the mesh.
         sort_by(&mut corners, |(a, _), (b, _)| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
@@ -354,7 +359,9 @@ impl Boundaries {
                     let ends = [chords.vertex(pair[0].1), chords.vertex(pair[1].1)];
                     polygon.push(pair[0].1);
                     let key = [ends[0].min(ends[1]), ends[0].max(ends[1])];
-                    if !chords.known.contains_key(&key) {
+                    if chords.known.contains_key(&key) {
+                        chords.are_shared = true;
+                    } else {
                         chords.known.insert(key, chords.list.len());
                         chords.edges.push(ends);
                         chords.list.push(Chord { ends: [pair[0].1, pair[1].1], arc });
@@ -393,6 +400,8 @@ struct Chords {
     number_of: HashMap<[u64; 2], usize>,
     /// Divided outlines and their regions
     polygons: Vec<(usize, Vec<Point>)>,
+    /// True if two outlines, or one outline twice, go along an edge
+    are_shared: bool,
 }
 
 impl Chords {
@@ -507,15 +516,17 @@ fn triangulate_with(
         }
         triangulation.add_constraint(from, to);
     }
-    if regions.len() > 1 {
+    // The mesh generator counts how many outlines lie between a face and the outside, which tells
+    // material from holes only where each edge belongs to one outline of one region.
+    let is_plain = regions.len() == 1 && !chords.are_shared;
+    if !is_plain {
         add_frame(&mut triangulation, chords, 2.0 * sizes.largest).map_err(failed)?;
     }
     let parameters = RefinementParameters::<f64>::new()
         .with_angle_limit(AngleLimit::from_radius_to_shortest_edge_ratio(0.5 / libm::sin(min_angle.to_radians())))
         .with_max_allowed_area(MAX_AREA * sizes.largest * sizes.largest)
         .with_max_additional_vertices(MAX_VERTICES)
-        // Counts how often outlines are crossed: regions inside others would count as holes.
-        .exclude_outer_faces(regions.len() == 1);
+        .exclude_outer_faces(is_plain);
     let result = triangulation.refine(parameters);
     Ok(result.refinement_complete.then_some(triangulation))
 }

@@ -173,18 +173,12 @@ pub enum ComputedShape {
 }
 
 impl ComputedSection {
-    /// A plain circle, tube or rectangle.
-    pub fn of_shape(shape: Shape, material: Spanned<String>, shear_factor: Option<ShearFactor>) -> Self {
-        let span = material.span.clone();
-        Self {
-            shape: ComputedShape::Solid(shape),
-            span,
-            material: Some(material),
-            fibre: Fibre::default(),
-            reference: None,
-            turn: 0.0,
-            mesh: None,
-            shear_factor,
+    /// A circle, tube or rectangle of one material, without a wanted mesh: where the material is
+    /// isotropic, its matrices and stresses have closed forms.
+    pub fn plain(&self) -> Option<(Shape, &Spanned<String>)> {
+        match (&self.shape, &self.material, self.mesh) {
+            (ComputedShape::Solid(shape), Some(material), None) => Some((*shape, material)),
+            (_, _, _) => None,
         }
     }
 }

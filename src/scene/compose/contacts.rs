@@ -2,13 +2,14 @@
 
 use super::{Composer, DrivenTable, stage_set};
 use crate::deck::{
-    self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, SectionBody, Shape, Spanned, Stage,
-    StageBody, SurfaceMotion,
+    self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, Shape, Spanned, Stage, StageBody,
+    SurfaceMotion,
 };
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
 use crate::scene::names::{self, unknown};
 use crate::scene::path;
+use crate::scene::section::PlainSection;
 use crate::scene::surfaces;
 use beamsim_core::effect::contact::{
     BeamPairs, Chain, ChainNode, ContactLaws, ContactStiffness, Meeting, SceneSurface, Strand, SurfaceCarrier,
@@ -414,12 +415,10 @@ fn radius_of_sections(deck: &Deck, beam: &str) -> Option<f64> {
     }
     let radius = |name: &Spanned<String>| {
         let section = deck.sections.iter().find(|section| section.name.value == name.value)?;
-        match section.body {
-            SectionBody::Shaped { shape: Shape::Circle { radius } | Shape::Tube { radius, .. }, .. } => Some(radius),
-            SectionBody::Shaped { shape: Shape::Rectangle { .. }, .. }
-            | SectionBody::Resultants { .. }
-            | SectionBody::Full { .. }
-            | SectionBody::Computed(_) => None,
+        let plain = PlainSection::of(section, deck).ok()??;
+        match plain.shape {
+            Shape::Circle { radius } | Shape::Tube { radius, .. } => (plain.place == [0.0; 2]).then_some(radius),
+            Shape::Rectangle { .. } => None,
         }
     };
     let radii: Option<Vec<f64>> = beam.sections.iter().map(radius).collect();
