@@ -8,7 +8,7 @@ use beamsim_core::effect::joint::{FreeCoordinate, Joint, JointKind};
 use beamsim_core::effect::spring::Link;
 use beamsim_core::kernel::inertia::{Derivatives, Inertia, Spin, body, drag, steadily_turned};
 use beamsim_core::kernel::joint::{DirectionPair, End, GapFactors, add_along, add_between, block, cosine, slides};
-use beamsim_core::kernel::turn::{Carrier, Start, StepCoefficients, Turn};
+use beamsim_core::kernel::turn::{Carrier, Start, StepCoefficients, Stretch, Turn};
 use beamsim_core::kernel::volume::VolumeForce;
 use beamsim_core::kernel::{ElementSystem, Weights};
 use beamsim_core::rotation::Rotation;
@@ -358,7 +358,8 @@ fn bodies_over_increments_agree() {
             omega: random.cube(2.0),
             acceleration: random.cube(2.0),
             algorithmic: random.cube(2.0),
-            stretch: 1.5,
+            earlier: random.cube(2.0),
+            stretch: Stretch::new(1.5, 1.0, step.alpha_m - step.alpha_f),
         };
         for carrier in [Carrier { tensor: whole, inverse }, Carrier::SPIN] {
             let turn = Turn::new(step, carrier, &start);

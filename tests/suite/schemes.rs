@@ -293,6 +293,36 @@ fn adaptive_steps_meet_their_tolerance() {
     }
 }
 
+/// A push that ends at once on a body that flies and turns freely.
+#[test]
+fn adaptive_steps_forget_a_jump_of_accelerations() {
+    let dissipation = ["generalized_alpha", "lie_generalized_alpha"]
+        .into_iter()
+        .flat_map(|name| [0.0, 0.3, 0.6, 0.8, 0.9, 0.95, 1.0].map(|rho| format!("\"{name}\"\nrho_inf = {rho:?}")));
+    let others = ["newmark", "hht", "lobatto"].map(|name| format!("\"{name}\""));
+    for scheme in dissipation.chain(others) {
+        for (tolerance, pushed) in [(1e-3, 0.1), (1e-4, 0.1), (1e-6, 0.1), (1e-4, 0.37)] {
+            let simulation = simulate(&format!(
+                "[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 1\ninertia = [0.5, 0.5, 0.5]\n\
+                 [[load]]\nat = \"a\"\nforce = [10, 0, 0]\nmoment = [0, 0, 1]\nhistory = \"h\"\n\
+                 [history.h]\ntimes = [0, {pushed}, {pushed}00000001]\nvalues = [1, 1, 0]\n\
+                 [[initial]]\nat = \"a\"\nvelocity = [0, 20, 0]\n\
+                 [[stage]]\nkind = \"dynamic\"\nend = 3\nstep = 0.01\nscheme = {scheme}\nadaptive = true\n\
+                 step_tolerance = {tolerance:?}\n[output]\ncolumns = [\"u\", \"r\"]\n"
+            ));
+            // A push of a constant force, and motion without a force after it.
+            let way = pushed * (3.0 - 0.5 * pushed);
+            for (column, exact) in [("a.ux", 10.0 * way), ("a.uy", 60.0), ("a.rz", 2.0 * way)] {
+                let found = simulation.end(column);
+                assert!(
+                    (found - exact).abs() < 5.0 * tolerance,
+                    "{scheme} {tolerance} {pushed} {column}: {found} {exact}"
+                );
+            }
+        }
+    }
+}
+
 /// Of a free body over increments the error is of order four, and so few steps are enough.
 #[test]
 fn adaptive_steps_know_what_increments_are_good_at() {

@@ -15,7 +15,7 @@
 
 use super::Method;
 use crate::kernel::Weights;
-use crate::kernel::turn::{StepCoefficients, Turn};
+use crate::kernel::turn::{StepCoefficients, Stretch, Turn};
 use crate::system::{Field, State};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
@@ -106,10 +106,11 @@ impl Scheme {
         self.alpha_m - self.alpha_f
     }
 
-    /// Starts a stage: the algorithmic acceleration begins as the true one. A scheme without one
-    /// takes no memory for it.
+    /// Starts a stage: the algorithmic acceleration begins as the true one, which is taken for
+    /// constant before. A scheme without one takes no memory for it.
     pub fn start(&self, state: &mut State) {
         state.algorithmic = if self.has_algorithmic() { state.a.clone() } else { Field::none() };
+        state.earlier = state.algorithmic.clone();
     }
 
     /// True if the scheme carries an algorithmic acceleration beside the true one.
@@ -137,27 +138,29 @@ pub struct Step {
 impl Step {
     /// Predicts the end of the step with the acceleration of its start.
     ///
-    /// `before` is the length of the step that the algorithmic acceleration comes from: its lag
-    /// changes with the length of the step. The stage must have begun with [`Scheme::start`].
+    /// `before` is the length of the step that the algorithmic acceleration comes from: see
+    /// [`Stretch`]. The stage must have begun with [`Scheme::start`].
     pub fn predict(&self, state: &mut State, before: f64) {
         debug_assert_ne!(self.scheme.has_algorithmic(), state.algorithmic.is_empty(), "the scheme was not started");
         let Scheme { beta, gamma, alpha_m, .. } = self.scheme;
         let h = self.length;
-        let stretch = h / before;
-        each_part(state, |_, Slots { q, v, a, algorithmic, turns }| {
+        let stretch = Stretch::new(h, before, self.scheme.lag());
+        each_part(state, |_, Slots { q, v, a, algorithmic, earlier, turns }| {
             for k in 0..q.len() {
                 if let Some(Some(turn)) = turns.get(k) {
                     q[k] = turn.guess();
                     (v[k], a[k]) = turn.rates(q[k]);
                     continue;
                 }
-                let own = algorithmic.get(k).copied().unwrap_or(a[k]);
-                let old = if stretch == 1.0 { own } else { a[k] + (own - a[k]) * stretch };
+                let old = match (algorithmic.get(k), earlier.get(k)) {
+                    (Some(own), Some(earlier)) => stretch.of(*own, a[k], *earlier),
+                    (_, _) => a[k],
+                };
                 let new = if alpha_m == 0.0 { a[k] } else { (a[k] - old * alpha_m) * (1.0 / (1.0 - alpha_m)) };
                 q[k] += v[k] * h + (old * (0.5 - beta) + new * beta) * (h * h);
                 v[k] += (old * (1.0 - gamma) + new * gamma) * h;
-                if let Some(algorithmic) = algorithmic.get_mut(k) {
-                    *algorithmic = new;
+                if let (Some(algorithmic), Some(earlier)) = (algorithmic.get_mut(k), earlier.get_mut(k)) {
+                    (*algorithmic, *earlier) = (new, a[k]);
                 }
             }
         });
@@ -183,7 +186,7 @@ impl Method for Step {
         let Weights { damping, mass, .. } = self.weights();
         let filtered = 1.0 / (self.scheme.beta * self.length * self.length);
         // Prescribed motions are not corrected: their rates stay as prescribed.
-        each_part(state, |start, Slots { q, v, a, algorithmic, turns }| {
+        each_part(state, |start, Slots { q, v, a, algorithmic, turns, .. }| {
             let dq = dq[start..start + q.len()].iter().enumerate();
             for (k, &dq) in dq.filter(|(_, dq)| **dq != Vec3::ZERO) {
                 q[k] += dq;
@@ -208,17 +211,20 @@ struct Slots<'a> {
     a: &'a mut [Vec3],
     /// Algorithmic accelerations; empty if the scheme has none
     algorithmic: &'a mut [Vec3],
+    /// True accelerations at the start of the step before; empty like these
+    earlier: &'a mut [Vec3],
     /// Rotations over the step, from the first slot on; empty if the scheme has none
     turns: &'a [Option<Turn>],
 }
 
 /// Calls `work` with each part of a state and the number of the part's first slot, in parallel.
 fn each_part(state: &mut State, work: impl Fn(usize, Slots) + Send + Sync) {
-    let State { q, v, a, algorithmic, turns, .. } = state;
-    let algorithmic = algorithmic.chunks_mut(PART).chain(repeat_with(|| &mut [][..]));
-    let rates = v.chunks_mut(PART).zip(a.chunks_mut(PART)).zip(algorithmic);
-    threads::each(q.chunks_mut(PART).zip(rates).enumerate(), |(number, (q, ((v, a), algorithmic)))| {
+    let State { q, v, a, algorithmic, earlier, turns, .. } = state;
+    let [algorithmic, earlier] =
+        [algorithmic, earlier].map(|field| field.chunks_mut(PART).chain(repeat_with(|| &mut [][..])));
+    let rates = v.chunks_mut(PART).zip(a.chunks_mut(PART)).zip(algorithmic.zip(earlier));
+    threads::each(q.chunks_mut(PART).zip(rates).enumerate(), |(number, (q, ((v, a), (algorithmic, earlier))))| {
         let start = PART * number;
-        work(start, Slots { q, v, a, algorithmic, turns: turns.get(start..).unwrap_or_default() });
+        work(start, Slots { q, v, a, algorithmic, earlier, turns: turns.get(start..).unwrap_or_default() });
     });
 }

@@ -28,7 +28,7 @@
 use super::time_error::{Correct, Largest, Scene, StepEnds, is_to_switch};
 use super::{Increments, Method, Scheme, Step};
 use crate::kernel::Weights;
-use crate::kernel::turn::{StartChange, Turn};
+use crate::kernel::turn::{StartChange, Stretch, Turn};
 use crate::model::{Assembly, SlotKind};
 use crate::rotation::{Complement, Rotation, log};
 use crate::system::{Category, DofMap, Field, Slot, State, System};
@@ -68,8 +68,8 @@ pub(super) struct CarriedError {
     length: f64,
     slots: Vec<SlotError>,
     step: Step,
-    /// The ratio of the length of the present step to that of the step before
-    stretch: f64,
+    /// The length of the step before the present one
+    before: f64,
     /// Velocities and accelerations, changed by the scaled error
     rates: [Field; 2],
     /// Forces of the changed rates, then the forces of inertia and damping on the error; by
@@ -138,11 +138,13 @@ struct Predicted {
 
 impl SlotError {
     #[inline(always)]
-    fn predicted(&self, step: &Step, stretch: f64) -> Predicted {
+    fn predicted(&self, step: &Step, stretch: Stretch) -> Predicted {
         let Scheme { beta, gamma, alpha_m, alpha_f, .. } = step.scheme;
         let h = step.length;
         let own = self.algorithmic;
-        let old = if stretch == 1.0 { own } else { self.rate2 + (own - self.rate2) * stretch };
+        // Of an error all of the lag is taken for smooth: fixed steps change their length rarely, and an
+        // error that is too large is told rather than one that is too small.
+        let old = stretch.of(own, self.rate2, Vec3([f64::NAN; 3]));
         let new = (self.rate2 * alpha_f - old * alpha_m) * (1.0 / (1.0 - alpha_m));
         Predicted {
             error: self.error + self.rate * h + (old * (0.5 - beta) + new * beta) * (h * h),
@@ -153,7 +155,7 @@ impl SlotError {
 
     /// A step of a rotation that starts with `part` times the error, and the increment with which
     /// it ends at the end of the step without error, whose increment is `x`.
-    fn changed(&self, turn: &Turn, x: Vec3, stretch: f64, part: f64) -> (Turn, Vec3) {
+    fn changed(&self, turn: &Turn, x: Vec3, stretch: Stretch, part: f64) -> (Turn, Vec3) {
         let by = StartChange {
             turned: self.error * part,
             omega: self.rate * part,
@@ -173,7 +175,7 @@ impl CarriedError {
             kinds: scene.kinds.clone(),
             length: scene.length,
             slots: threads::list(scene.kinds.len(), of_slot),
-            stretch: 1.0,
+            before: step.length,
             rates: [state.v.clone(), state.a.clone()],
             force,
             turned: Vec::new(),
@@ -190,8 +192,13 @@ impl CarriedError {
     /// Begins an attempt at a step; `before` is the length of the step before.
     pub fn begin(&mut self, step: &Step, before: f64) {
         self.step = *step;
-        self.stretch = step.length / before;
+        self.before = before;
         self.known = Known::Nothing;
+    }
+
+    /// The change of the length of the present step.
+    fn stretch(&self) -> Stretch {
+        Stretch::new(self.step.length, self.before, self.step.scheme.lag())
     }
 
     /// True if [`Self::look`] has not been called in the present step.
@@ -231,10 +238,10 @@ impl CarriedError {
     /// Sets the changed rates: those of the state less those of the scaled error that is zero at
     /// the end of the step.
     fn change_rates(&mut self, state: &State, weights: Weights) {
-        let Self { slots, rates: [v, a], scaling, step, stretch, .. } = self;
+        let stretch = self.stretch();
+        let Self { slots, rates: [v, a], scaling, step, .. } = self;
         let slots = &slots[..];
         let step = &*step;
-        let stretch = *stretch;
         let scaling = *scaling;
         v.copy_from(&state.v);
         a.copy_from(&state.a);
@@ -289,13 +296,14 @@ impl CarriedError {
     /// Converts the errors of increments of rotation in `error` to errors of rotations and their
     /// rates.
     fn find_turned(&mut self, state: &State, error: &[Vec3]) {
-        let Self { slots, turned, scaling, stretch, .. } = self;
+        let stretch = self.stretch();
+        let Self { slots, turned, scaling, .. } = self;
         turned.clear();
         for (k, turn) in turns(state) {
             let x = state.q[k];
             let omega = state.v[k];
             let acceleration = state.a[k];
-            let (changed, same) = slots[k].changed(turn, x, *stretch, *scaling);
+            let (changed, same) = slots[k].changed(turn, x, stretch, *scaling);
             let other = same + error[k] * *scaling;
             let (other_omega, other_acceleration) = changed.rates(other);
             let ahead = Rotation::new(slots[k].error * *scaling).r * Rotation::new(other).r;
@@ -314,7 +322,7 @@ impl CarriedError {
     pub fn end(&mut self, dof_map: &DofMap, error: &[Vec3], step_ends: StepEnds, increments: Option<&Increments>) {
         let StepEnds { from, to } = step_ends;
         let Step { scheme, length: h } = self.step;
-        let stretch = self.stretch;
+        let stretch = self.stretch();
         let weights = self.step.weights();
         self.steps += 1;
         let own = self.steps % SLOPE_STEPS;

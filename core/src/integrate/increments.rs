@@ -6,7 +6,7 @@
 
 use super::Step;
 use crate::kernel::inertia::Inertia;
-use crate::kernel::turn::{Carrier, Start, Turn};
+use crate::kernel::turn::{Carrier, Start, Stretch, Turn};
 use crate::model::charts::DYNAMIC_BAND;
 use crate::model::{Model, StageKind};
 use crate::rotation::{Rotation, complement, log};
@@ -53,6 +53,7 @@ impl Increments {
         for &(slot, carrier) in &self.carriers {
             let spin = state.spin(slot);
             state.algorithmic[slot as usize] = spin.rotation.r * carrier.rate(spin.omega, spin.acceleration);
+            state.earlier[slot as usize] = state.algorithmic[slot as usize];
         }
     }
 
@@ -60,6 +61,7 @@ impl Increments {
     /// before.
     pub fn begin(&self, state: &mut State, step: &Step, before: f64) {
         state.unwrapped_mut();
+        let stretch = Stretch::new(step.length, before, step.scheme.lag());
         let mut turns = std::mem::take(&mut state.turns);
         turns.resize(state.q.len(), None);
         for &(slot, carrier) in &self.carriers {
@@ -70,9 +72,12 @@ impl Increments {
                 omega: spin.omega,
                 acceleration: spin.acceleration,
                 algorithmic: state.algorithmic[k],
-                stretch: step.length / before,
+                earlier: state.earlier[k],
+                stretch,
             };
-            turns[k] = Some(Turn::new(step.coefficients(), carrier, &start));
+            let turn = Turn::new(step.coefficients(), carrier, &start);
+            state.earlier[k] = turn.rate();
+            turns[k] = Some(turn);
             state.q[k] = Vec3::ZERO;
             state.v[k] = spin.omega;
             state.a[k] = spin.acceleration;

@@ -75,8 +75,45 @@ pub struct Start {
     pub acceleration: Vec3,
     /// B0, spatial
     pub algorithmic: Vec3,
-    /// The ratio of the length of the step to that of the step before, by which the lag of B0 grows
-    pub stretch: f64,
+    /// b at the start of the step before, spatial
+    pub earlier: Vec3,
+    /// The change of the length of the step
+    pub stretch: Stretch,
+}
+
+/// The length of a step over that of the step before, where an algorithmic acceleration A0 of the
+/// step before begins one of another length.
+///
+/// A0 belongs to a time that lies (alpha_m - alpha_f) h ahead of the true acceleration a0, so that
+/// the smooth part of A0 - a0, (alpha_m - alpha_f)(a0 - a_1) with a_1 at the start of the step
+/// before, grows with the step. The rest is an oscillation from step to step that a jump of
+/// accelerations leaves: it dies away by |alpha_m/(1 - alpha_m)| a step, and must not grow with
+/// steps that grow.
+#[derive(Clone, Copy, Debug)]
+pub struct Stretch {
+    /// Length of the step over that of the step before
+    ratio: f64,
+    /// alpha_m - alpha_f
+    lag: f64,
+}
+
+impl Stretch {
+    /// From a step of the length `before` to one of the length `length`, of a method with the lag
+    /// alpha_m - alpha_f.
+    pub fn new(length: f64, before: f64, lag: f64) -> Self {
+        Self { ratio: length / before, lag }
+    }
+
+    /// A0 for the new step from `own`, that of the step before, with a0 (`now`) and a_1 (`earlier`);
+    /// a_1 is NaN where it is not known.
+    #[inline]
+    pub fn of(self, own: Vec3, now: Vec3, earlier: Vec3) -> Vec3 {
+        if self.ratio == 1.0 {
+            return own;
+        }
+        let smooth = if earlier.0[0].is_nan() { own - now } else { (now - earlier) * self.lag };
+        now + smooth * self.ratio + (own - now - smooth) * (1.0 / self.ratio).min(1.0)
+    }
 }
 
 /// A change of the [start](Start) of a step.
@@ -106,6 +143,10 @@ pub struct Turn {
     rate: Vec3,
     /// B0
     algorithmic: Vec3,
+    /// B0 as the step before has left it
+    own: Vec3,
+    /// b at the start of the step before
+    earlier: Vec3,
     /// ((beta h/gamma) I - (h^2/12) w0~)^-1
     gain: Mat3,
 }
@@ -116,7 +157,7 @@ impl Turn {
         let omega = start.omega;
         let momentum = carrier.tensor * start.omega;
         let rate = carrier.rate(omega, start.acceleration);
-        let lag = start.rotation.transpose_mul(start.algorithmic) - rate;
+        let [own, earlier] = [start.algorithmic, start.earlier].map(|spatial| start.rotation.transpose_mul(spatial));
         let h = step.length;
         Self {
             base: start.rotation,
@@ -125,23 +166,31 @@ impl Turn {
             omega,
             momentum,
             rate,
-            algorithmic: rate + lag * start.stretch,
+            algorithmic: start.stretch.of(own, rate, earlier),
+            own,
+            earlier,
             gain: inverse(step.beta * h / step.gamma, h * h / 12.0, omega),
         }
     }
 
     /// The step from a start that differs by `by`. `stretch` is [`Start::stretch`] of this step.
-    pub fn changed(&self, by: &StartChange, stretch: f64) -> Self {
+    pub fn changed(&self, by: &StartChange, stretch: Stretch) -> Self {
         let Self { base, carrier, step, .. } = *self;
         let own = carrier.inverse * (self.rate - self.omega.cross(self.momentum));
         let start = Start {
             rotation: base * Rotation::new(by.turned).r,
             omega: self.omega + by.omega,
             acceleration: own + by.acceleration,
-            algorithmic: base * (self.rate + (self.algorithmic - self.rate) * (1.0 / stretch)) + by.algorithmic,
+            algorithmic: base * self.own + by.algorithmic,
+            earlier: base * self.earlier,
             stretch,
         };
         Self::new(step, carrier, &start)
+    }
+
+    /// b0, spatial.
+    pub fn rate(&self) -> Vec3 {
+        self.base * self.rate
     }
 
     /// R0, the rotation at the start of the step.
@@ -260,7 +309,7 @@ mod tests {
     const STEP: StepCoefficients = StepCoefficients { beta: 0.3, gamma: 0.6, alpha_m: 0.2, alpha_f: 0.4, length: 0.3 };
 
     /// A step of a body with an inclined inertia tensor that starts in motion.
-    fn turn(stretch: f64) -> (Turn, Start) {
+    fn turn(ratio: f64) -> (Turn, Start) {
         let inertia = Mat3([[2.0, 0.3, -0.1], [0.3, 1.5, 0.2], [-0.1, 0.2, 3.0]]);
         let matrix = nalgebra::Matrix3::from_fn(|i, j| inertia.0[i][j]).try_inverse().unwrap();
         let inverse = Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)])));
@@ -269,7 +318,8 @@ mod tests {
             omega: Vec3([1.0, -0.5, 0.8]),
             acceleration: Vec3([0.3, 0.9, -0.4]),
             algorithmic: Vec3([0.5, -0.7, 0.2]),
-            stretch,
+            earlier: Vec3([0.1, 0.2, -0.4]),
+            stretch: Stretch::new(ratio, 1.0, STEP.alpha_m - STEP.alpha_f),
         };
         (Turn::new(STEP, Carrier { tensor: inertia, inverse }, &start), start)
     }
@@ -306,7 +356,13 @@ mod tests {
         let (same, start) = turn(1.0);
         let (longer, _) = turn(2.0);
         let now = same.carrier.rate(start.omega, start.acceleration);
-        assert!((longer.algorithmic - now - (same.algorithmic - now) * 2.0).max_abs() < 1e-15);
+        // The smooth part grows with the step, the rest becomes smaller.
+        let earlier = start.rotation.transpose_mul(start.earlier);
+        let smooth = (now - earlier) * (STEP.alpha_m - STEP.alpha_f);
+        let expected = smooth * 2.0 + (same.algorithmic - now - smooth) * 0.5;
+        assert!((longer.algorithmic - now - expected).max_abs() < 1e-15);
+        let unknown = Stretch::new(2.0, 1.0, -0.2).of(Vec3::UNIT[0], Vec3::ZERO, Vec3([f64::NAN; 3]));
+        assert_eq!(unknown, Vec3::UNIT[0] * 2.0);
     }
 
     #[test]
@@ -317,7 +373,8 @@ mod tests {
             omega: spin,
             acceleration: Vec3::ZERO,
             algorithmic: Vec3::ZERO,
-            stretch: 1.0,
+            earlier: Vec3::ZERO,
+            stretch: Stretch::new(1.0, 1.0, 0.0),
         };
         let turn = Turn::new(STEP, Carrier::SPIN, &start);
         assert!((turn.guess() - spin * STEP.length).max_abs() < 1e-15);

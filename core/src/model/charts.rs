@@ -70,6 +70,7 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>
             if let Some(lag) = lag.filter(|_| !state.algorithmic.is_empty()) {
                 let drift = (change.b_rate * acceleration) * 2.0 + change.b_rate2 * velocity;
                 state.algorithmic[slot] = change.b * state.algorithmic[slot] + change.b_rate * velocity + drift * lag;
+                state.earlier[slot] = Vec3([f64::NAN; 3]);
             }
             state.q[slot] = change.p;
             state.v.put(slot, change.velocity);

@@ -63,6 +63,9 @@ pub struct State {
     /// momentum, see [`Turn`]; during the iterations of a step it has the value at the start of the
     /// step.
     pub(crate) algorithmic: Field,
+    /// True accelerations at the start of the last step, where there are algorithmic ones, and like
+    /// these rates of angular momenta; NaN where a chart has changed
+    pub(crate) earlier: Field,
     /// Factor of each load, valid at `time` and `load`
     pub amplitude: Vec<f64>,
     /// For each beam element the nodes whose rotation is converted into the chart of the first;
@@ -101,6 +104,7 @@ impl State {
             v: rates.clone(),
             a: rates,
             algorithmic: Field::none(),
+            earlier: Field::none(),
             amplitude: vec![0.0; amplitudes],
             mixed: vec![0; elements],
             unwrapped: Vec::new(),
@@ -122,6 +126,7 @@ impl State {
             v: self.v.clone(),
             a: self.a.clone(),
             algorithmic: self.algorithmic.clone(),
+            earlier: self.earlier.clone(),
             amplitude: self.amplitude.clone(),
             mixed: self.mixed.clone(),
             unwrapped: self.unwrapped.clone(),
@@ -141,6 +146,7 @@ impl State {
             self.v = rest.clone();
             self.a = rest;
             self.algorithmic = Field::none();
+            self.earlier = Field::none();
         }
     }
 
@@ -175,6 +181,7 @@ impl State {
         self.v.copy_from(&other.v);
         self.a.copy_from(&other.a);
         self.algorithmic.copy_from(&other.algorithmic);
+        self.earlier.copy_from(&other.earlier);
     }
 
     /// Takes over another state that has equal velocities and accelerations, as in statics.
