@@ -68,7 +68,10 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
                 let message = format!("`interval` gives more rows than the limit of {}", deck::MOST_STEPS);
                 diagnostics.push(Diagnostic::limit(message, stage.span.clone()));
             }
-            clock = end;
+            // A stage with `until` may end at any time before.
+            if stage.until.is_none() {
+                clock = end;
+            }
         }
     }
 }
@@ -165,7 +168,8 @@ fn missing_mass(deck: &Deck, section: &deck::Section) -> Option<Missing> {
         SectionBody::Full { mass: None, .. } => Some(Missing { key: "`mass`", zero: "a `mass` of zeros" }),
         SectionBody::Computed(body) => {
             let without = !super::computed::has_density(body, deck);
-            let key = if body.plain().is_some() { "a material with `rho`" } else { "materials with `rho`" };
+            let key =
+                if body.solid_without_mesh().is_some() { "a material with `rho`" } else { "materials with `rho`" };
             without.then_some(Missing { key, zero: "`rho = 0`" })
         }
         SectionBody::Resultants { mass: Some(_), .. } | SectionBody::Full { mass: Some(_), .. } => None,
@@ -249,7 +253,9 @@ fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<
     let incremental = |stage: &deck::Stage| {
         matches!(stage.body, StageBody::Dynamic { scheme: deck::SchemeWord::LieGeneralizedAlpha(_), .. })
     };
-    let Some(stage) = deck.stages.iter().find(|stage| incremental(stage)) else { return };
+    let mut numbered = deck.stages.iter().enumerate().filter(|(_, stage)| incremental(stage));
+    let numbers: Vec<usize> = numbered.clone().map(|(number, _)| number + 1).collect();
+    let Some((_, stage)) = numbered.next() else { return };
     let scheme = "scheme = \"lie_generalized_alpha\"";
     for beam in deck.beams.iter().filter(|beam| beam.interpolation == deck::InterpolationWord::Total) {
         let name = &beam.name.value;
@@ -257,7 +263,10 @@ fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<
         let diagnostic = Diagnostic::error(message, beam.name.span.clone());
         diagnostics.push(diagnostic.context(stage.span.clone(), "this stage"));
     }
-    for support in &deck.supports {
+    let acts = |support: &&deck::Support| {
+        support.stages.as_ref().is_none_or(|stages| stages.iter().any(|stage| numbers.contains(stage)))
+    };
+    for support in deck.supports.iter().filter(acts) {
         if support.fix[3..].iter().filter(|&&fixed| fixed).count() == 1 {
             let message = format!("{scheme} cannot fix a single rotation component");
             let diagnostic = Diagnostic::error(message, support.span.clone()).help("use a joint to ground");

@@ -1,7 +1,10 @@
 //! What goes through several stages: histories that belong to some of them, what jumps between them, and what cannot begin.
 
-use crate::scenes::frequencies;
+use crate::random::Random;
+use crate::scenes::{self, frequencies};
 use crate::scenes::{attempt, refusal, simulate, warnings};
+use beamsim_core::tensor::Vec3;
+use beamsim_core::warning::WarningKind;
 
 /// A clamped beam.
 const ARM: &str = r#"
@@ -276,4 +279,125 @@ fn hints_know_the_deck() {
     );
     let path = "[[load]]\nat = \"tip\"\nforce = [0, 1, 0]\n[[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = 2\n";
     assert!(loose(path).contains("put a static stage with load levels before this one"), "{}", loose(path));
+}
+
+/// Angular momentum about node `o` before and after a second stage pins it.
+fn caught(parts: &str, scheme: &str) -> [[f64; 3]; 2] {
+    let stage =
+        |end: f64| format!("[[stage]]\nkind = \"dynamic\"\nend = {end:?}\nstep = 1e-5\nscheme = \"{scheme}\"\n");
+    let run = simulate(&format!(
+        "[point]\no = [0, 0, 0]\n{parts}[[support]]\nat = \"o\"\nfix = \"pin\"\nstages = [2]\n{}{}[output]\nnodes = [\"o\"]\n\
+         columns = [\"u\", \"v\", \"momentum\"]\n",
+        stage(3e-4),
+        stage(3.2e-4)
+    ));
+    let values = |prefix: &str, row: usize| ["x", "y", "z"].map(|axis| run.column(&format!("{prefix}{axis}"))[row]);
+    let speed = |row: usize| values("o.v", row).iter().fold(0.0, |sum: f64, v| sum.max(v.abs()));
+    let first = (0..run.rows.len()).find(|&row| speed(row) < 1e-12).unwrap();
+    assert!(first > 20 && speed(first - 1) > 0.1);
+    [first - 1, first].map(|row| {
+        let [x, p, l] = ["o.u", "momentum.p", "momentum.l"].map(|prefix| Vec3(values(prefix, row)));
+        (l - x.cross(p)).0
+    })
+}
+
+#[test]
+fn a_support_that_catches_what_moves_keeps_the_angular_momentum_about_it() {
+    let mut random = Random::new(77);
+    let mut list = |size: f64| scenes::list(random.cube(size));
+    for _ in 0..3 {
+        let body = format!(
+            "[[body]]\nat = \"o\"\nmass = 2\ninertia = [0.3, 0.4, 0.5]\noffset = {}\n[[initial]]\nvelocity = {}\nspin = {}\n",
+            list(1.0),
+            list(3.0),
+            list(2.0)
+        );
+        let chain = format!(
+            "q = {}\n{body}[[body]]\nat = \"q\"\nmass = 1\ninertia = [0.1, 0.2, 0.15]\noffset = {}\n\
+             [[joint]]\nkind = \"revolute\"\nnodes = [\"o\", \"q\"]\naxis = {}\n",
+            list(1.0),
+            list(0.5),
+            list(1.0)
+        );
+        let rod = format!(
+            "e = {}\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 10\nEI = 10\nrhoA = 1\nrhoJ = [2e-3, 1e-3, 1e-3]\n[[beam]]\n\
+             name = \"b\"\nsection = \"s\"\nthrough = [\"o\", \"e\"]\nelements = 3\norder = 2\n[[initial]]\nvelocity = {}\n",
+            list(1.0),
+            list(3.0)
+        );
+        for parts in [&body, &chain, &rod] {
+            for scheme in ["generalized_alpha", "lie_generalized_alpha", "newmark", "lobatto"] {
+                let [before, after] = caught(parts, scheme);
+                let size = before.iter().fold(0.0, |size: f64, l| size.max(l.abs()));
+                let error = (0..3).map(|k| (after[k] - before[k]).abs()).fold(0.0, f64::max);
+                assert!(error < 2e-5 * size, "{scheme}: {before:?} {after:?}\n{parts}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_body_that_is_caught_beside_its_centre_turns_on() {
+    // m v d = (J + m d^2) w about the pin.
+    let body =
+        "[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 2\ninertia = [0.3, 0.3, 0.3]\noffset = [0, -1, 0]\n";
+    let stages = "[[support]]\nat = \"a\"\nfix = \"pin\"\nstages = [2]\n[[initial]]\nat = \"a\"\nvelocity = [1, 0, 0]\n\
+                  [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\n[[stage]]\nkind = \"dynamic\"\nend = 0.2\nstep = 0.01\n";
+    let run = simulate(&format!("{body}{stages}[output]\ncolumns = [\"w\"]\n"));
+    assert!((run.end("a.wz") - 2.0 / 2.3).abs() < 1e-9, "{}", run.end("a.wz"));
+}
+
+#[test]
+fn a_load_whose_history_is_over_comes_back_with_its_last_value() {
+    let bar = "[point]\nroot = [0, 0, 0]\ntip = [1, 0, 0]\n[section.s]\nEA = 100\nGA = 100\nGJ = 1\nEI = 1\nrhoA = 1\n[[beam]]\n\
+               name = \"arm\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = 1\n[[support]]\nat = \"root\"\n\
+               fix = \"all\"\n[history.h]\ntimes = [0, 1]\nvalues = [0, 0.5]\n";
+    let at = |acts: &str| {
+        let run = simulate(&format!("{bar}{acts}{STATIC}{STATIC}{STATIC}[output]\ncolumns = [\"u\"]\n"));
+        run.end("tip.ux")
+    };
+    let history = "stages = [1, 3]\nhistory = { name = \"h\", stages = [1] }\n";
+    assert!((at(&format!("[[load]]\nat = \"tip\"\nforce = [10, 0, 0]\n{history}")) - 0.05).abs() < 1e-6);
+    assert!((at(&format!("[[motion]]\nat = \"tip\"\nux = 0.1\n{history}")) - 0.05).abs() < 1e-9);
+}
+
+#[test]
+fn a_stage_may_end_before_the_one_before_it_could_have() {
+    let body =
+        "[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 2\n[[initial]]\nat = \"a\"\nvelocity = [1, 0, 0]\n";
+    let stages = "[[stage]]\nkind = \"dynamic\"\nend = 10\nstep = 0.01\nuntil = { column = \"a.ux\", above = LIMIT }\n\
+                  [[stage]]\nkind = \"dynamic\"\nend = 1.6\nstep = 0.01\n[output]\ncolumns = [\"u\"]\n";
+    let run = simulate(&format!("{body}{}", stages.replace("LIMIT", "0.6")));
+    assert!((run.end("a.ux") - 1.6).abs() < 1e-9);
+    let late = attempt(&format!("{body}{}", stages.replace("LIMIT", "3")));
+    assert!(late.result.is_err_and(|failure| failure.to_string().contains("`end` is a time, not a duration")));
+}
+
+#[test]
+fn a_support_of_another_stage_does_not_concern_increments() {
+    let deck = |stages: &str| {
+        format!(
+            "[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 1\ninertia = [0.1, 0.1, 0.1]\n[[support]]\nat = \"a\"\n\
+             fix = [\"ux\", \"uy\", \"uz\", \"rx\"]\nstages = {stages}\n[[support]]\nat = \"a\"\nfix = \"all\"\nstages = [1]\n\
+             [[stage]]\nkind = \"static\"\nsteps = 1\n[[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\n\
+             scheme = \"lie_generalized_alpha\"\n"
+        )
+    };
+    assert!(refusal(&deck("[2]")).contains("cannot fix a single rotation component"));
+    assert!(attempt(&deck("[1]")).result.is_ok());
+}
+
+/// A top that hangs from a pin, with its own axis upright, and spins.
+#[test]
+fn modes_of_what_turns_are_told_to_be_those_at_rest() {
+    let deck = |spin: f64| {
+        format!(
+            "gravity = [0, 0, -10]\n[point]\no = [0, 0, 0]\n[[body]]\nat = \"o\"\nmass = 1\ninertia = [0.1, 0.1, 0.15]\n\
+             offset = [0, 0, -0.5]\n[[support]]\nat = \"o\"\nfix = \"pin\"\n[[initial]]\nat = \"o\"\nspin = [0, 0, {spin:?}]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\n[[stage]]\nkind = \"modal\"\nmodes = 3\n"
+        )
+    };
+    let warned =
+        |spin: f64| attempt(&deck(spin)).counters.findings.warnings.iter().any(|w| w.kind == WarningKind::OutOfBalance);
+    assert!(warned(30.0) && !warned(1e-3));
 }

@@ -153,6 +153,10 @@ pub struct Progress {
     course: Course,
     /// The value where the stage before has ended
     pub(super) reached: f64,
+    /// The value where the last stage in which it acted has ended
+    kept: f64,
+    /// It acts in the present stage, and the state goes on in it
+    acts: bool,
     has_acted: bool,
     /// The last ramp that went anywhere
     last_ramp: Option<Ramp>,
@@ -172,7 +176,11 @@ impl Progress {
         if let Some(history) = &amplitude.history {
             history.begin_stage(&mut self.clock, start.number, start.kind, start.time);
         }
+        if self.acts {
+            self.kept = self.reached;
+        }
         let acts = amplitude.acts_in(start.number);
+        self.acts = acts && start.kind.advances_state();
         self.course =
             if acts { self.course_acting(amplitude, start) } else { self.course_absent(amplitude, start.kind) };
         // A modal stage only looks.
@@ -193,7 +201,7 @@ impl Progress {
         let ramp = |factor: f64| Course::Ramp(Ramp { from: self.reached, to: amplitude.full * factor });
         match (amplitude.entry, start.kind, amplitude.goal(start.number)) {
             (Entry::Switch, ..) => Course::Hold(amplitude.full),
-            (_, StageKind::Modal, _) | (_, _, Goal::Stay) => stay,
+            (_, StageKind::Modal, _) | (_, StageKind::Buckling, Goal::Stay) => stay,
             (_, StageKind::Buckling, goal) => match goal {
                 Goal::Value(factor) if start.fresh && self.is_fresh(amplitude, start.number) => ramp(factor),
                 Goal::Value(_) | Goal::History | Goal::Stay if start.fresh => stay,
@@ -201,6 +209,10 @@ impl Progress {
             },
             (_, StageKind::Static | StageKind::Dynamic, Goal::History) => Course::History(start.kind),
             (_, StageKind::Static, Goal::Value(factor)) => ramp(factor),
+            // Behind a stage in which it did not act, it comes back.
+            (_, StageKind::Static, Goal::Stay) => Course::Ramp(Ramp { from: self.reached, to: self.kept }),
+            (Entry::Load, StageKind::Dynamic, Goal::Stay) => Course::Hold(self.kept),
+            (Entry::Motion, StageKind::Dynamic, Goal::Stay) => stay,
             (Entry::Motion, StageKind::Dynamic, Goal::Value(_)) if self.has_acted => stay,
             (_, StageKind::Dynamic, Goal::Value(factor)) => Course::Hold(amplitude.full * factor),
         }
@@ -358,6 +370,25 @@ mod tests {
         assert_eq!(halves(own(&[2]), &[Static, Static, Static, Static]), [1.0, 2.0, 3.0, 4.0]);
         assert_eq!(halves(own(&[1]), &[Dynamic, Static, Dynamic]), [2.0, 3.0, 4.0]);
         assert_eq!(halves(own(&[0, 2]), &[Static, Static, Static]), [3.0, 4.0, 3.0]);
+    }
+
+    #[test]
+    fn a_history_that_is_over_comes_back_with_its_load() {
+        let ramp = Arc::new(Table { times: vec![0.0, 1.0], values: vec![2.0, 4.0], smooth: false });
+        let history = Reading::new(ramp.clone(), StageSet(Some(vec![0])));
+        let load = |stages: &[usize]| Amplitude::of_load(Some(history.clone()), StageSet(Some(stages.to_vec())));
+        assert_eq!(halves(load(&[0, 2, 3]), &[Static, Static, Static, Static]), [3.0, 2.0, 2.0, 4.0]);
+        assert_eq!(halves(load(&[0, 2]), &[Static, Dynamic, Dynamic, Static]), [3.0, 0.0, 4.0, 2.0]);
+        // A modal or buckling stage that it acts in leaves no value.
+        for look in [StageKind::Modal, StageKind::Buckling] {
+            assert_eq!(halves(load(&[0, 2, 3]), &[Static, Static, look, Static])[3], 2.0);
+        }
+        let motion = Amplitude::of_motion(0.5, Some(history.clone()), StageSet(Some(vec![0, 1])));
+        let mut progress = Progress::default();
+        begin(&mut progress, &motion, 0, Static);
+        progress.reached = value(&progress, &motion, 1.0);
+        begin(&mut progress, &motion, 1, Static);
+        assert_eq!([0.0, 1.0].map(|factor| value(&progress, &motion, factor)), [2.0, 2.0]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use crate::integrate::{Largest, Rotations};
 use crate::run::energy::Imbalance;
 use crate::run::findings::StageTimeError;
 use crate::run::stage_run::StageRun;
+use crate::system::StageKind;
 use crate::warning::WarningKind;
 use std::f64::consts::PI;
 
@@ -45,6 +46,13 @@ impl Dynamics<'_, '_> {
             let why = if gained > 0.0 && self.stage.state.contacts.taken_over > OWN_PART * gained {
                 "the springs that hold the contact forces of a static stage in this one store energy that no load \
                  gave (give the contact a larger `stiffness`)"
+            } else if self.has_caught
+                || self.stage.plan.stages[..self.stage.number]
+                    .iter()
+                    .all(|stage| stage.work.kind() != StageKind::Static)
+            {
+                "what acts changes at once between stages: supports that catch what moves, springs that are added or \
+                 removed under load"
             } else {
                 "the work of earlier stages is integrated by the trapezoidal rule between load levels (use more \
                  `steps` there)"

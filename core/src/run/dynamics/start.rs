@@ -16,19 +16,41 @@ use crate::threads;
 use crate::warning::WarningKind;
 use nalgebra::{Matrix3, SymmetricEigen};
 
+/// Relative change of a velocity that is round-off.
+const ROUND_OFF: f64 = 1e-9;
+
 impl Dynamics<'_, '_> {
     /// Gives velocities, sets the clock, and finds the accelerations of the start.
     pub(super) fn start(&mut self) -> Result<(), Failure> {
+        let StageRun { state, number, .. } = &*self.stage;
+        if state.time >= self.settings.end {
+            return Err(Failure::Deck(format!(
+                "stage {} ends at `end` = {}, but the stages before it have reached the time {} (`end` is a time, not a \
+                 duration)",
+                number + 1,
+                self.settings.end,
+                state.time
+            )));
+        }
+        let held = self.held_velocities();
         let begins = self.set_in_motion();
         self.set_clock()?;
+        let mut caught = held.and_then(|held| self.caught(&held));
         self.stage.refuse_penetration()?;
+        let before = caught.is_some().then(|| self.stage.state.q.clone());
         self.stage.change_charts(None);
+        if let (Some(caught), Some(before)) = (&mut caught, before) {
+            // In another chart a rotation has other rates: its impulse is left out.
+            let is_changed = |slot: &usize| self.stage.state.q[*slot] != before[*slot];
+            (0..before.len()).filter(is_changed).for_each(|slot| caught[slot] = Vec3::ZERO);
+        }
+        self.has_caught = caught.is_some();
         self.stage.linearise()?;
         let step = self.first_step();
         self.refuse_loose(&step)?;
         // Time steps do not look out of the plane again.
         SpatialLook::default().refuse_loose(self.stage, step.weights())?;
-        self.close_joints()?;
+        self.join_velocities(caught.as_deref())?;
         self.solve_accelerations()?;
         self.settings.scheme.start(self.stage.state);
         if let Some(increments) = &self.increments {
@@ -58,6 +80,41 @@ impl Dynamics<'_, '_> {
         begins
     }
 
+    /// The velocities in held directions where a motion goes on from the stage before; `None` without
+    /// one.
+    fn held_velocities(&self) -> Option<Vec<Vec3>> {
+        let StageRun { state, past, assembly, .. } = &*self.stage;
+        let dof_map = &assembly.system.pattern.dof_map;
+        past.moving.then(|| threads::list(state.v.len(), |slot| dof_map.held_part(slot as Slot, state.v[slot])))
+    }
+
+    /// The changes of the velocities in held directions, which were `held` before: where supports and
+    /// motions act that did not act before. `None` without such.
+    fn caught(&mut self, held: &[Vec3]) -> Option<Vec<Vec3>> {
+        let StageRun { state, assembly, model, .. } = &*self.stage;
+        let dof_map = &assembly.system.pattern.dof_map;
+        let change = |slot: usize| dof_map.held_part(slot as Slot, state.v[slot]) - held[slot];
+        let caught = threads::list(held.len(), change);
+        let is_change = |slot: &usize| {
+            let size = caught[*slot].norm();
+            size > ROUND_OFF * held[*slot].norm().max(state.v[*slot].norm()) && !model.kinds[*slot].is_multiplier()
+        };
+        let slots: Vec<usize> = (0..held.len()).filter(is_change).collect();
+        let acting = || self.stage.schedule.motions(model).filter(|(_, timeline)| timeline.acts());
+        let by_support = slots.iter().filter(|&&slot| acting().all(|(motion, _)| motion.slot as usize != slot));
+        if let Some(&slot) = by_support.into_iter().max_by(|a, b| caught[**a].norm().total_cmp(&caught[**b].norm())) {
+            let (node, stage) = (model.node_at(slot), self.stage.number + 1);
+            self.stage.warn(
+                WarningKind::VelocityJump,
+                format!(
+                    "supports of stage {stage} stop what moves, the fastest at node \"{node}\": their impulse on all \
+                     that is connected takes kinetic energy at once"
+                ),
+            );
+        }
+        (!slots.is_empty()).then_some(caught)
+    }
+
     /// Sets the clock, and all accelerations but prescribed ones to zero; motors and surfaces must not
     /// jump.
     pub(super) fn set_clock(&mut self) -> Result<(), Failure> {
@@ -85,13 +142,20 @@ impl Dynamics<'_, '_> {
     }
 
     /// Velocities that the gaps of joints allow: those given, changed by the impulses that closing
-    /// the joints takes, [M G^T; G 0] [dv; impulse] = [0; -dg/dt].
+    /// the joints takes.
     pub(super) fn close_joints(&mut self) -> Result<(), Failure> {
-        if self.stage.model.multipliers.is_empty() {
+        self.join_velocities(None)
+    }
+
+    /// Velocities that the gaps of joints allow, after velocities in held directions have changed by
+    /// `caught`: those given, changed by the impulses of joints and supports, [M G^T; G 0] [dv;
+    /// impulse] = [-M_fc dv_c; -dg/dt].
+    fn join_velocities(&mut self, caught: Option<&[Vec3]>) -> Result<(), Failure> {
+        if self.stage.model.multipliers.is_empty() && caught.is_none() {
             return Ok(());
         }
         let [rates, _] = self.stage.assembly.drift(self.stage.state);
-        self.stage.assembly.evaluate(self.stage.state, Weights::MASS, None);
+        self.stage.assembly.evaluate(self.stage.state, Weights::MASS, caught);
         self.refuse_open_joints()?;
         self.stage.assembly.system.forget_forces();
         let Some(impulse) = self.solve_with_mass(&rates)? else { return Ok(()) };

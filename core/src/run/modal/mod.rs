@@ -23,6 +23,9 @@ const TOLD_UNCERTAINTY: f64 = 1e-3;
 /// Two frequencies that agree to this are one, and the more unstable mode comes first.
 const SAME_FREQUENCY: f64 = 1e-7;
 
+/// Angular velocity of a node over the lowest frequency up to which there is no warning.
+const NEGLIGIBLE_SPIN: f64 = 0.01;
+
 /// A modal stage.
 pub(super) struct Modal<'s, 'r> {
     pub(super) stage: &'s mut StageRun<'r>,
@@ -39,6 +42,7 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
     fn run(&mut self) -> Result<(), Failure> {
         self.stage.tell_progress(0.0)?;
         let moving = self.stage.state.clone();
+        let spin = self.fastest_spin();
         self.stand_still()?;
         let matrices = self.matrices()?;
         let found = self.find(&matrices)?;
@@ -52,6 +56,7 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
             self.refine(motion);
         }
         self.warn_of_modes(&found, &listed);
+        self.warn_of_spin(spin, &listed);
         self.stage.counters.steps += 1;
         // What moved moves on.
         self.stage.state.copy_rates(&moving);
@@ -74,6 +79,30 @@ impl Modal<'_, '_> {
         self.stage.open_account()?;
         self.stage.warn_out_of_balance();
         Ok(())
+    }
+
+    /// The fastest rotation of a node, rad per time.
+    fn fastest_spin(&self) -> f64 {
+        let StageRun { state, charted, .. } = &*self.stage;
+        if !state.moves() {
+            return 0.0;
+        }
+        charted.rotations.iter().map(|&slot| state.spin(slot).omega.norm()).fold(0.0, f64::max)
+    }
+
+    /// A state that turns has forces of inertia, which modes of the state at rest leave out.
+    fn warn_of_spin(&mut self, spin: f64, listed: &[SmallMotion]) {
+        let lowest = listed.iter().map(|motion| motion.exponent.norm()).filter(|&omega| omega > 0.0);
+        let lowest = lowest.fold(f64::INFINITY, f64::min);
+        if spin <= NEGLIGIBLE_SPIN * lowest {
+            return;
+        }
+        let stage = self.stage.number + 1;
+        let message = format!(
+            "stage {stage} begins in motion, and rotates at up to {spin:.3e} rad per unit of time: its modes are those of the same shape at \
+             rest (a steady rotation of the whole is a `frame` of a static stage)"
+        );
+        self.stage.warn(WarningKind::OutOfBalance, message);
     }
 
     fn matrices(&mut self) -> Result<Matrices, Failure> {
