@@ -60,6 +60,11 @@ pub struct Chosen {
 }
 
 impl RunArguments {
+    /// True if an accuracy of a deck is wanted.
+    pub fn searches(&self, loaded: &Loaded) -> bool {
+        self.accuracy.is_some() || loaded.deck.accuracy.is_some()
+    }
+
     /// Searches for the wanted accuracy of a deck where there is one. Runs of the search are saved
     /// in the folder of results, so that a search that was stopped goes on.
     pub fn choose(

@@ -40,6 +40,10 @@ fn one(name: &str, path: &Path, settings: &[String], tolerance: f64, folder: &Pa
     let Loaded { deck, scene, .. } = load::deck(path, settings)?;
     let mut progress = |what: &str| console::note(&format!("{name}: {what}"));
     let found = study_effects(&deck, &scene, tolerance, &signals::caught, &mut progress)?;
+    for warning in &found.whole.counters.findings.warnings {
+        console::count_warnings(1);
+        console::note(&format!("{name}: {warning}"));
+    }
     print(name, scene.title.as_deref(), &found, tolerance);
     let table = found.to_csv().map_err(OutputError::from)?;
     PartFile::write(folder, "effects.csv", &table)?;

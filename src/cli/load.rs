@@ -44,11 +44,13 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, CommandError> {
 
 /// Reads the text of a deck that comes from a file, and builds its scene.
 pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, CommandError> {
-    let ReadDeck { own, imported: Imported { text, tables }, label, deck, found } = read(path, own, settings)?;
+    let ReadDeck { own, imported, label, deck, found } = read(path, own, settings)?;
     let built = scene::from_deck(&deck, found);
-    let refuse = |found: Vec<Diagnostic>| refusal(path, &label, &text, &found, expected_failures(&deck));
+    let refuse =
+        |found: Vec<Diagnostic>| refusal(path, &label, &own, &imported.at_home(&own, &found), expected_failures(&deck));
     let (scene, warnings) = built.map_err(refuse)?;
-    show_warnings(path, &label, &text, warnings)?;
+    show_warnings(path, &label, &own, imported.at_home(&own, &warnings))?;
+    let Imported { text, tables } = imported;
     let source = source(path, &own, &text, tables);
     Ok(Loaded { text, source, deck, scene })
 }
@@ -88,12 +90,12 @@ pub struct ReadDeck {
 impl ReadDeck {
     /// Shows warnings about the deck; they are its error with `--deny-warnings`.
     pub fn warn(&self, path: &Path, warnings: Vec<Diagnostic>) -> Result<(), CommandError> {
-        show_warnings(path, &self.label, &self.imported.text, warnings)
+        show_warnings(path, &self.label, &self.own, self.imported.at_home(&self.own, &warnings))
     }
 
     /// The error that shows messages about the deck.
     pub fn refuse(&self, path: &Path, found: &[Diagnostic]) -> CommandError {
-        refusal(path, &self.label, &self.imported.text, found, Vec::new())
+        refusal(path, &self.label, &self.own, &self.imported.at_home(&self.own, found), Vec::new())
     }
 }
 
@@ -106,7 +108,8 @@ pub fn read(path: &Path, own: &str, settings: &[String]) -> Result<ReadDeck, Com
     let imported = deck::import(&own, &|name| beside(path, name));
     let imported = imported.map_err(|found| refusal(path, &label, &own, &found, Vec::new()))?;
     let read = deck::read(&imported.text);
-    let (deck, found) = read.map_err(|found| refusal(path, &label, &imported.text, &found, Vec::new()))?;
+    let refuse = |found: Vec<Diagnostic>| refusal(path, &label, &own, &imported.at_home(&own, &found), Vec::new());
+    let (deck, found) = read.map_err(refuse)?;
     Ok(ReadDeck { own, imported, label, deck, found })
 }
 

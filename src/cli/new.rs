@@ -55,28 +55,40 @@ pub fn new(template: Template, out: Option<&Path>) -> Status {
 
 /// Writes a deck with the schema beside it; a file that exists is left as it is.
 pub fn write(text: &str, path: &Path) -> Result<(), CommandError> {
-    let file = OpenOptions::new().write(true).create_new(true).open(path);
-    match file.and_then(|mut file| file.write_all(text.as_bytes())).and_then(|()| schema_beside(path)) {
+    match create(path, text).and_then(|()| schema_beside(path)) {
         Ok(()) => {
+            let word = quoted(path);
             let path = path.display();
-            console::line(&format!("{path}: next `beamsim check {path}`, then `beamsim run {path}`"));
+            console::line(&format!("{path}: next `beamsim check {word}`, then `beamsim run {word}`"));
             Ok(())
         }
         Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(CommandError::Io(format!(
-            "{}: already exists and is not overwritten (use --out for another name)",
+            "{}: already exists, and decks are not overwritten, not even with --force (use --out for another name)",
             path.display()
         ))),
         Err(error) => Err(CommandError::Io(format!("{}: {error}", path.display()))),
     }
 }
 
+/// Creates a file with its whole text, or none.
+fn create(path: &Path, text: &str) -> std::io::Result<()> {
+    let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
+    file.write_all(text.as_bytes()).inspect_err(|_| drop(std::fs::remove_file(path)))
+}
+
+/// A path as one word of a command line.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:=@%".contains(c);
+    if text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
 /// The schema that the deck names in its first line, for editors.
 fn schema_beside(path: &Path) -> std::io::Result<()> {
     let schema = path.with_file_name("beamsim.schema.json");
     // Never through a link that stands there.
-    match OpenOptions::new().write(true).create_new(true).open(&schema) {
-        Ok(mut file) => file.write_all(SCHEMA.as_bytes()),
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(()),
-        Err(error) => Err(error),
+    match create(&schema, SCHEMA) {
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
+        Ok(()) | Err(_) => Ok(()),
     }
 }

@@ -186,6 +186,9 @@ fn stage_by_stage(stages: &[f64], loads: &[f64]) -> Vec<f64> {
 /// The history in a folder, or the file itself.
 fn read(path: &Path, is_reference: bool) -> Result<NamedHistory, CommandError> {
     let file = HistoryReader::of_results(path)?.unwrap_or_else(|| path.to_path_buf());
+    if file.is_dir() {
+        return Err(CommandError::Io(format!("{}: no history.csv is in this folder", path.display())));
+    }
     let history = HistoryReader::read(&file)?;
     let run = PlottedRun::of(&file, "history");
     // `results/arm/history.csv` is `arm`.

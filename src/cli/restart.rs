@@ -63,4 +63,21 @@ impl RestartArguments {
             )),
         }
     }
+
+    /// Refuses to begin a long search before a run that would not begin.
+    pub fn refuse_early(&self, folder: &ResultFolder) -> Result<(), CommandError> {
+        if self.resume || self.fresh { Ok(()) } else { refuse_checkpoint(folder, "--resume, or --fresh to begin anew") }
+    }
+}
+
+/// Refuses a folder with the checkpoint of a run that was stopped; `way` says how to go on.
+pub fn refuse_checkpoint(folder: &ResultFolder, way: &str) -> Result<(), CommandError> {
+    if !folder.has_checkpoint() {
+        return Ok(());
+    }
+    let place = folder.path().display();
+    Err(CommandError::Checkpoint(format!(
+        "{place} has the checkpoint of a run that was stopped, which would be lost: continue it with `beamsim run` and \
+         {way}, or give another folder with --out"
+    )))
 }

@@ -48,6 +48,9 @@ fn run_one(
     let results = outputs::claim(folder)?;
     // From here on a signal stops what is under way, and leaves the folder in order.
     let _kept = signals::keep();
+    if wanted.searches(&loaded) {
+        wanted.restart.refuse_early(&results)?;
+    }
     let mut chosen = wanted.choose(name, path, loaded, &results)?;
     let mut target = wanted.restart.target(name, results, &chosen.loaded.scene)?;
     let missed = chosen.missed.take();

@@ -3,6 +3,7 @@
 use super::error::CommandError;
 use super::folders::folder;
 use super::load::{self, Loaded};
+use super::restart::refuse_checkpoint;
 use super::simulate::{RunExtras, Target, simulate};
 use super::status::Status;
 use super::thread_count::threads_of;
@@ -66,7 +67,7 @@ fn one(path: &Path, name: &str, settings: &[String], folder: Option<&Path>) -> R
     };
     let mut recorder = Recorder::new(&scene);
     let extras = RunExtras { source, ..RunExtras::default() };
-    let target = folder.map(|folder| outputs::claim(folder).map(Target::without_checkpoints)).transpose()?;
+    let target = folder.map(target).transpose()?;
     let finished = simulate(&scene, name, target, Some(&mut recorder), extras, threads_of(&scene, None));
     if let Some(signal) = signals::caught() {
         return Err(CommandError::Stopped { signal, message: format!("stopped by signal {signal}") });
@@ -74,6 +75,13 @@ fn one(path: &Path, name: &str, settings: &[String], folder: Option<&Path>) -> R
     let judgements = judge(&recorder, &finished.result, &finished.counters);
     print_judgements(path, &judgements, finished.seconds);
     Ok(judgements)
+}
+
+/// A folder of results without the checkpoint of another run.
+fn target(folder: &Path) -> Result<Target, CommandError> {
+    let folder = outputs::claim(folder)?;
+    refuse_checkpoint(&folder, "--resume")?;
+    Ok(Target::without_checkpoints(folder))
 }
 
 /// Folders are replaced by the decks in them, in the order of their names, subfolders last.

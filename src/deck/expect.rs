@@ -180,6 +180,11 @@ fn read_column(table: &Table) -> Option<ExpectBody> {
             return table.wrong("[[expect]] needs `value`, `below`, `above`, `fails` or `warns`");
         }
     }
+    if let (Some(below), Some(above)) = (below, above)
+        && above >= below
+    {
+        return table.wrong_key("above", format!("no number is above {above} and below {below}"));
+    }
     let value = table.optional("value", |_, _| read_target(table));
     Some(ExpectBody::Column { column: column?, reduce: reduce?, value: value?, below, above })
 }

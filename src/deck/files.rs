@@ -12,6 +12,17 @@ pub struct Unreadable {
     pub severity: Severity,
 }
 
+/// A table or a mesh that a deck imports.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedTable {
+    /// Its path in the deck
+    pub(crate) name: String,
+    /// The number of its rows or triangles
+    pub(crate) rows: usize,
+    /// A fingerprint of the content of its file
+    pub(crate) hash: String,
+}
+
 /// The fingerprint of a file: XXH3 of 64 bits. It finds files that have changed; it does not prove
 /// who wrote them.
 pub fn fingerprint(content: &[u8]) -> String {

@@ -3,7 +3,8 @@
 
 use super::beam::StationsWord;
 use super::diagnostic::Severity;
-use super::files::{Unreadable, fingerprint};
+use super::files::{ImportedTable, Unreadable, fingerprint};
+use super::home::{Home, from_table};
 use super::mesh_file::Triangles;
 use super::{Diagnostic, Span, Words};
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
@@ -17,22 +18,18 @@ pub type Open<'o> = &'o dyn Fn(&str) -> Result<Vec<u8>, Unreadable>;
 /// The text of a deck, and the tables that it imports.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Imported {
-    /// The text with the rows of all tables. Lines keep their numbers; sections of a table and
-    /// triangles follow at the end.
+    /// The text with the rows of all tables. Sections of a table and triangles follow at the end.
     pub text: String,
     /// The tables, in the order in which they are read
     pub(crate) tables: Vec<ImportedTable>,
 }
 
-/// A table or a mesh that a deck imports.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImportedTable {
-    /// Its path in the deck
-    pub(crate) name: String,
-    /// The number of its rows or triangles
-    pub(crate) rows: usize,
-    /// A fingerprint of the content of its file
-    pub(crate) hash: String,
+impl Imported {
+    /// Messages about the text with the rows of tables, as messages about the text `own` of the user.
+    pub fn at_home(&self, own: &str, found: &[Diagnostic]) -> Vec<Diagnostic> {
+        let home = Home::new(own, &self.text, &self.tables);
+        found.iter().map(|diagnostic| home.of(diagnostic.clone())).collect()
+    }
 }
 
 /// Replaces everything that a deck imports by the rows of the files.
@@ -123,14 +120,18 @@ impl Importer<'_> {
                         let message = format!("`{key}` is given in the beam and as columns of {path}");
                         self.found.push(Diagnostic::error(message, self.place(&path)));
                     }
-                    beam.insert(key, Item::Value(values.into()));
+                    beam.insert(key, made(values, &path));
                 }
                 let name = beam.get("name").and_then(Item::as_str).map_or(number.to_string(), str::to_string);
                 let names: Vec<String> = (1..=stations.len()).map(|k| format!("{name} {k}")).collect();
                 beam.insert("section", Item::Value(names.iter().collect::<Array>().into()));
-                beam.insert("stations", Item::Value(stations.into_iter().collect::<Array>().into()));
-                beam.insert("stations_in", Item::Value(unit.word().into()));
-                self.sections.extend(names.into_iter().zip(sections.into_iter().map(Item::Table)));
+                beam.insert("stations", made(stations.into_iter().collect::<Array>(), &path));
+                beam.insert("stations_in", made(unit.word(), &path));
+                let sections = sections.into_iter().map(|(line, mut section)| {
+                    section.decor_mut().set_suffix(from_table(&path, Some(line)));
+                    Item::Table(section)
+                });
+                self.sections.extend(names.into_iter().zip(sections));
             }
         }
     }
@@ -179,7 +180,7 @@ impl Importer<'_> {
             };
             surface.insert("through", Item::Value(points.into()));
             if let Some(radii) = radii.filter(|_| surface.get("radius").is_none()) {
-                surface.insert("radius", Item::Value(radii.into()));
+                surface.insert("radius", made(radii, &path));
             }
         }
     }
@@ -219,8 +220,8 @@ impl Importer<'_> {
             if let Some((times, values)) = self.table(&path, |table| table.history(column.as_deref())) {
                 history.remove("csv");
                 history.remove("column");
-                history.insert("times", Item::Value(times.into()));
-                history.insert("values", Item::Value(values.into()));
+                history.insert("times", made(times, &path));
+                history.insert("values", made(values, &path));
             }
         }
     }
@@ -283,12 +284,20 @@ impl Importer<'_> {
     }
 }
 
+/// A value of a line of its own, which says what table it is from.
+fn made(value: impl Into<Value>, path: &str) -> Item {
+    let mut value = value.into();
+    value.decor_mut().set_suffix(from_table(path, None));
+    Item::Value(value)
+}
+
 /// Stations along a beam, and the section at each.
 struct Stations {
     /// The unit of the places
     unit: StationsWord,
     places: Vec<f64>,
-    sections: Vec<Table>,
+    /// Lines of the file, and what stands there
+    sections: Vec<(u64, Table)>,
     /// Keys of the beam with a value for each station
     along: Vec<(&'static str, Array)>,
 }
@@ -457,7 +466,8 @@ impl Csv {
         if rotary.contains(&true) && rotary.contains(&false) {
             return Err("rotary inertia needs the three columns `rhoJ1`, `rhoJ2`, `rhoJ3`".into());
         }
-        let sections = self.rows.iter().map(|row| self.section(row)).collect::<Result<_, _>>()?;
+        let section = |(row, &line): (&Vec<f64>, &u64)| Ok((line, self.section(row)?));
+        let sections = self.rows.iter().zip(&self.lines).map(section).collect::<Result<_, String>>()?;
         Ok(Stations { unit, places: self.column(place).collect(), sections, along: self.along() })
     }
 
@@ -573,9 +583,9 @@ mod tests {
             "{whole}"
         );
         let history = with("[history.h]\ncsv = \"f.csv\"\ncolumn = \"F\"\n", "time,F,G\n0,1,2\n1,3,4\n").unwrap();
-        assert!(history.contains("times = [0.0, 1.0]\nvalues = [1.0, 3.0]") && !history.contains("csv"), "{history}");
+        assert!(history.contains("times = [0.0, 1.0] # from f.csv\nvalues = [1.0, 3.0] #"), "{history}");
         let turned = with("[history.h]\ncsv = \"f.csv\"\n", "F,time\n5,0\n6,1\n").unwrap();
-        assert!(turned.contains("times = [0.0, 1.0]\nvalues = [5.0, 6.0]"), "{turned}");
+        assert!(turned.contains("times = [0.0, 1.0] # from f.csv\nvalues = [5.0, 6.0] #"), "{turned}");
         let outline =
             with("[section.s]\noutline = { csv = \"o.csv\" }\nholes = [{ csv = \"h.csv\" }]\n", "x2,x3\n0,1\n");
         let outline = outline.unwrap();
@@ -587,9 +597,9 @@ mod tests {
             assert!(with(section, wrong).is_err(), "{wrong}");
         }
         let whole = with(section, "s,EA,GA2,GA3,GJ,EI2,EI3,rhoA\n0,9,8,7,6,5,4,3\n2,1,1,1,1,1,1,1\n").unwrap();
-        let stations = "stations = [0.0, 2.0]\nstations_in = \"length\"";
+        let stations = "stations = [0.0, 2.0] # from s.csv\nstations_in = \"length\" # from s.csv";
         assert!(whole.contains("section = [\"b 1\", \"b 2\"]") && whole.contains(stations), "{whole}");
-        assert!(whole.contains("[section.\"b 1\"]\nEA = 9.0\nGA = [8.0, 7.0]"), "{whole}");
+        assert!(whole.contains("[section.\"b 1\"] # from s.csv, line 2\nEA = 9.0\nGA = [8.0, 7.0]"), "{whole}");
         let full = with(section, "fraction,C11,C12,C22\n0,9,1,8\n1,9,2,8\n").unwrap();
         assert!(full.contains("[[9.0, 2.0, 0.0, 0.0, 0.0, 0.0], [2.0, 8.0"), "{full}");
     }
@@ -671,6 +681,40 @@ mod tests {
         let short = import_up_to(1, history, &|_| Ok("0,1\n1,2\n".into())).unwrap();
         assert_eq!((short.text.as_str(), short.tables.len()), (history, 0));
         assert_ne!(fingerprint(b"0,1\n1,2\n"), fingerprint(b"0,1\n1,3\n"));
+    }
+
+    #[test]
+    fn messages_are_about_the_text_of_the_user() {
+        let own = "title = \"a\"\n[section.s]\nEA = 5\n[[beam]]\nname = \"b\"\nsection = { csv = \"s.csv\" } # stations\nelements = 3\n\n\
+                   [history.h]\ncsv = \"f.csv\"\ncolumn = \"F\"\nsmooth = true\n\n[history.g]\ncsv = \"g.csv\"\n\
+                   [[beam]]\nthrough = { csv = \"p.csv\" }\nwrong = 1\n";
+        let file = |path: &str| match path {
+            "s.csv" => "# comment\ns,EA,GA2,GA3,GJ,EI2,EI3\n0,1,1,1,1,1,1\n2,-7,1,1,1,1,1\n",
+            "p.csv" => "x,y,z\n0,0,0\n1,0,0\n",
+            _ => "time,F\n0,1\n1,2\n",
+        };
+        for ends in ["\n", "\r\n"] {
+            messages_are_told_at_home(&own.replace('\n', ends), &file);
+        }
+    }
+
+    /// Checks what is said of parts of a deck with tables.
+    fn messages_are_told_at_home(own: &str, file: &dyn Fn(&str) -> &'static str) {
+        let imported = import(own, &|path| Ok(file(path).into())).unwrap();
+        let told = |part: &str| {
+            let start = imported.text.find(part).unwrap_or_else(|| panic!("{part} in {}", imported.text));
+            let found = Diagnostic::error("wrong", start..start + part.len());
+            let found = imported.at_home(own, &[found]).remove(0);
+            (own[found.span.unwrap()].to_string(), found.label)
+        };
+        let plain = |part: &str| assert_eq!(told(part), (part.to_string(), String::new()));
+        ["title", "name", "elements = 3", "smooth", "[history.g]", "wrong = 1"].into_iter().for_each(plain);
+        assert_eq!(told("EA = -7.0"), ("s.csv".into(), "line 4 of this table".into()));
+        assert_eq!(told("GJ = 1.0"), ("s.csv".into(), "line 3 of this table".into()));
+        assert_eq!(told("stations = "), ("s.csv".into(), "in this table".into()));
+        assert_eq!(told("[\"b 1\""), ("s.csv".into(), "in this table".into()));
+        assert_eq!(told("[0.0, 1.0]"), ("f.csv".into(), "in this table".into()));
+        assert_eq!(told("[[0.0, 0.0, 0.0]"), ("p.csv".into(), "in this table".into()));
     }
 
     #[test]

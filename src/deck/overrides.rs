@@ -1,5 +1,6 @@
 //! `--set key=value`: changes a deck before it is read.
 
+use super::hints::nearest;
 use super::scheme::{COEFFICIENTS, SchemeName};
 use super::words::Words;
 use toml_edit::{DocumentMut, Item, Key, Table, TableLike, Value};
@@ -20,6 +21,7 @@ pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
             return Err(format!("--set {setting}: expected KEY=VALUE"));
         };
         let keys = Key::parse(path.trim()).map_err(|_| format!("--set {setting}: `{path}` is not a key"))?;
+        refuse_unused(text, &document, &keys).map_err(|why| format!("--set {setting}: {why}"))?;
         set(document.as_item_mut(), &keys, read_value(value.trim()))
             .map_err(|why| format!("--set {setting}: {why}"))?;
         given.push(keys.iter().map(|key| key.get().to_string()).collect::<Vec<_>>());
@@ -33,6 +35,23 @@ pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
         }
     }
     Ok(document.to_string())
+}
+
+/// Refuses a parameter that the deck does not have, unless the deck uses it.
+fn refuse_unused(text: &str, document: &DocumentMut, keys: &[Key]) -> Result<(), String> {
+    let [table, name] = keys else { return Ok(()) };
+    if table.get() != "param" {
+        return Ok(());
+    }
+    let known = document.get("param").and_then(Item::as_table_like);
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    if known.is_some_and(|known| known.contains_key(name.get())) || text.split(|c| !is_word(c)).any(|w| w == name.get())
+    {
+        return Ok(());
+    }
+    let meant = nearest(name.get(), known.into_iter().flat_map(|known| known.iter().map(|(name, _)| name)));
+    let hint = meant.map_or(String::new(), |meant| format!(": did you mean `{meant}`?"));
+    Err(format!("the deck has no parameter `{}`{hint}", name.get()))
 }
 
 /// Takes the coefficients of the scheme that a stage had before out of it, unless they are given as
@@ -195,5 +214,8 @@ mod tests {
         assert!(with("stage.2.step=1").unwrap_err().contains("there is no entry 2"));
         assert!(with("sections.leg.EA=1").unwrap_err().contains("no `sections`"));
         assert!(with("param.L").unwrap_err().contains("KEY=VALUE"));
+        assert!(with("param.l=1").unwrap_err().contains("no parameter `l`: did you mean `L`?"));
+        // A deck may leave a parameter open.
+        assert!(apply("[section.s]\nEA = \"2*E\"\n", &["param.E=3".into()]).unwrap().contains("E = 3"));
     }
 }

@@ -91,12 +91,16 @@ impl SweepFile {
         let texts = |key: &str| top.get(key).map_or(Some(Vec::new()), |item| context.texts(item));
         let plain = |texts: Vec<Spanned<String>>| texts.into_iter().map(|text| text.value).collect();
         let whole = |key: &str, least, most| top.get(key).and_then(|item| context.whole(item, least, most));
+        let zip = top.flag("zip").unwrap_or(false);
+        if zip && top.has("sample") {
+            return top.wrong_key("zip", "`sample` draws random points: remove `zip`, or `sample`");
+        }
         let vary = Table::of_names(context, top.required("vary")?, "[vary]")?;
         Some(Self {
             deck: context.text(top.required("deck")?)?.value,
             set: plain(texts("set")?),
             vary: vary.entries().filter_map(|(key, item)| read_vary(context, key, item)).collect(),
-            zip: top.flag("zip").unwrap_or(false),
+            zip,
             sample: whole("sample", 1, MOST_SAMPLES).map(|count| count.value),
             seed: whole("seed", 0, LARGEST_SEED).map(|seed| seed.value as u64),
             outputs: plain(texts("outputs")?),

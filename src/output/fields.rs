@@ -15,6 +15,7 @@ use std::ffi::OsStr;
 use std::fmt::Write;
 use std::fs::{self, File};
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 /// VTK's cell types of lines with two, three and four nodes.
 const LINES: [u8; 3] = [3, 21, 35];
@@ -27,7 +28,13 @@ struct FieldFile {
     name: String,
     /// The time for ParaView
     time: f64,
+    /// Its length in bytes
+    bytes: u64,
 }
+
+/// Time for making files safe on the disk at once, at most. A run writes them faster than disks
+/// confirm them; what is left is written by the system within its usual half a minute.
+const SAFE_TIME: Duration = Duration::from_secs(1);
 
 /// Fields as far as they are written.
 #[derive(Deserialize, Serialize)]
@@ -85,17 +92,30 @@ impl FieldsWriter {
                 fs::remove_file(entry.path()).map_err(wrong)?;
             }
         }
+        for file in &written {
+            let path = part.join(&file.name);
+            let length = fs::metadata(&path).map_err(|error| OutputError::file(&path, error))?.len();
+            if length != file.bytes {
+                let why = "was lost in a crash of the machine: begin the run anew with --fresh";
+                return Err(OutputError::content(&path, why));
+            }
+        }
         Ok(Self { figure, timed, safe: written.len(), written, pending, part })
     }
 
-    /// Makes the files so far safe on the disk, and tells what it takes to go on behind them.
+    /// Makes the files so far safe on the disk, as far as that is soon done, and tells what it takes to
+    /// go on behind them.
     pub fn save(&mut self) -> Result<SavedFields, OutputError> {
+        let begun = Instant::now();
         for file in &self.written[self.safe..] {
+            if begun.elapsed() > SAFE_TIME {
+                break;
+            }
             let path = self.part.join(&file.name);
             let synced = File::open(&path).and_then(|file| file.sync_all());
             synced.map_err(|error| OutputError::file(&path, error))?;
+            self.safe += 1;
         }
-        self.safe = self.written.len();
         Ok(SavedFields { written: self.written.clone(), pending: self.pending.clone() })
     }
 
@@ -116,8 +136,8 @@ impl FieldsWriter {
         let content = grid(&self.figure, at.stage, state, origin);
         let name = format!("{:06}.vtu", self.written.len());
         let path = self.part.join(&name);
-        fs::write(&path, content).map_err(|error| OutputError::file(&path, error))?;
-        self.written.push(FieldFile { name, time: at.time });
+        fs::write(&path, &content).map_err(|error| OutputError::file(&path, error))?;
+        self.written.push(FieldFile { name, time: at.time, bytes: content.len() as u64 });
         Ok(())
     }
 
@@ -138,7 +158,7 @@ fn index(folder: &str, written: &[FieldFile]) -> String {
     let mut text = String::from(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n",
     );
-    for FieldFile { name, time } in written {
+    for FieldFile { name, time, .. } in written {
         let _ = writeln!(text, "<DataSet timestep=\"{time:?}\" part=\"0\" file=\"{folder}/{name}\"/>");
     }
     text + "</Collection>\n</VTKFile>\n"

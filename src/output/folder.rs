@@ -104,6 +104,11 @@ impl ResultFolder {
         Ok(folder)
     }
 
+    /// True if the folder has the checkpoint of a run that was stopped.
+    pub fn has_checkpoint(&self) -> bool {
+        self.path.join(CHECKPOINT).exists()
+    }
+
     /// The path of the folder.
     pub fn path(&self) -> &Path {
         &self.path

@@ -272,7 +272,7 @@ impl PlainSection {
     /// A section that has closed forms; `None` for others.
     pub fn of(section: &deck::Section, deck: &Deck) -> Result<Option<Self>, Diagnostic> {
         let SectionBody::Computed(body) = &section.body else { return Ok(None) };
-        let Some((shape, material)) = body.plain() else { return Ok(None) };
+        let Some((shape, material)) = body.solid_without_mesh() else { return Ok(None) };
         let found = find_material(material, &deck.materials)?;
         let Elastic::Isotropic(elastic) = found.elastic else { return Ok(None) };
         let elastic = Isotropic { poisson: contraction(&elastic), ..elastic };
@@ -357,9 +357,9 @@ pub fn taper(ends: [&deck::Section; 2], deck: &Deck) -> Result<SectionCourse, Di
     })
 }
 
-/// The part by which a stiffness that is linear between two computed sections would exceed that of
-/// linear dimensions in the middle, where it grows with their fourth power; `None` where it is not
-/// linear, or where it was given in numbers.
+/// The largest part by which a stiffness that is linear between two computed sections would exceed
+/// that of linear dimensions, with whose fourth power it grows; `None` where it is not linear, or
+/// where it was given in numbers.
 pub fn excess_of_taper(ends: [&deck::Section; 2], deck: &Deck) -> Option<f64> {
     let is_computed = |section: &&deck::Section| matches!(section.body, SectionBody::Computed(_));
     if !ends.iter().all(is_computed) || Taper::new(ends, deck).ok()?.is_some() {
@@ -368,7 +368,10 @@ pub fn excess_of_taper(ends: [&deck::Section; 2], deck: &Deck) -> Option<f64> {
     let [a, b] = [matrices(ends[0], deck).ok()?, matrices(ends[1], deck).ok()?];
     let excess = |k: usize| {
         let ratio = b.stiffness[k][k] / a.stiffness[k][k];
-        0.5 * (1.0 + ratio) / fourth(0.5 * (1.0 + libm::pow(ratio, 0.25))) - 1.0
+        // (1 + r s)/(1 + d s)^4 is largest at this part of the way.
+        let (r, d) = (ratio - 1.0, libm::pow(ratio, 0.25) - 1.0);
+        let s = if r == 0.0 { 0.5 } else { (r - 4.0 * d) / (3.0 * r * d) };
+        (1.0 + r * s) / fourth(1.0 + d * s) - 1.0
     };
     (0..6).map(excess).max_by(f64::total_cmp)
 }

@@ -3,7 +3,7 @@
 use super::generate::Corpus;
 use super::input::{Input, Language, TABLE};
 use super::process;
-use beamsim::deck::{self, Beam, Deck, Diagnostic, Expression, Severity, SweepFile, Unreadable};
+use beamsim::deck::{self, Beam, Deck, Diagnostic, Expression, Imported, Severity, SweepFile, Unreadable};
 use beamsim::output::HistoryReader;
 use beamsim::{scene, study};
 use std::panic::{self, AssertUnwindSafe};
@@ -48,6 +48,11 @@ pub fn inspect(input: &Input, corpus: &Corpus) -> Verdict {
 
 /// The deck with its settings and tables; `Err` holds the verdict where it is refused.
 pub fn whole_text(input: &Input, corpus: &Corpus) -> Result<String, Verdict> {
+    with_tables(input, corpus).map(|(_, imported)| imported.text)
+}
+
+/// The deck with its settings, without and with its tables.
+fn with_tables(input: &Input, corpus: &Corpus) -> Result<(String, Imported), Verdict> {
     let text = deck::apply(&input.text, &input.settings).map_err(|message| {
         let named = message.starts_with("--set ") && !message.ends_with(": ");
         if named { Verdict::Refused } else { Verdict::Fault(format!("no name in an error of --set: {message}")) }
@@ -60,33 +65,40 @@ pub fn whole_text(input: &Input, corpus: &Corpus) -> Result<String, Verdict> {
             Err(Unreadable { message, severity: Severity::File })
         }
     };
-    deck::import(&text, &open).map(|imported| imported.text).map_err(|found| refusal(&text, &found))
+    match deck::import(&text, &open) {
+        Ok(imported) => Ok((text, imported)),
+        Err(found) => Err(refusal(&text, &found)),
+    }
 }
 
 fn inspect_deck(input: &Input, corpus: &Corpus) -> Verdict {
-    let text = match whole_text(input, corpus) {
-        Ok(text) => text,
+    let (own, imported) = match with_tables(input, corpus) {
+        Ok(whole) => whole,
         Err(verdict) => return verdict,
     };
+    let text = &imported.text;
+    // Messages are about the text of the user.
+    let refused = |found: &[Diagnostic]| refusal(&own, &imported.at_home(&own, found));
     // Every deck is a wrong sweep file, too.
-    if let Err(found) = SweepFile::read(&text)
-        && let Verdict::Fault(fault) = refusal(&text, &found)
+    if let Err(found) = SweepFile::read(text)
+        && let Verdict::Fault(fault) = refusal(text, &found)
     {
         return Verdict::Fault(format!("as a sweep file, {fault}"));
     }
-    let (deck, found) = match deck::read(&text) {
+    let (deck, found) = match deck::read(text) {
         Ok(read) => read,
-        Err(found) => return refusal(&text, &found),
+        Err(found) => return refused(&found),
     };
     if elements(&deck) > MOST_ELEMENTS {
         return Verdict::Large;
     }
     match scene::from_deck(&deck, found) {
-        Ok((scene, warnings)) => match warnings.iter().find_map(|warning| fault_of(&text, warning)) {
+        Ok((scene, warnings)) => match imported.at_home(&own, &warnings).iter().find_map(|found| fault_of(&own, found))
+        {
             Some(fault) => Verdict::Fault(fault),
             None => Verdict::Accepted(scene.mesh.element_count),
         },
-        Err(found) => refusal(&text, &found),
+        Err(found) => refused(&found),
     }
 }
 

@@ -966,3 +966,63 @@ fn equal_warnings_are_said_once() {
     assert_eq!(said.matches("warning[velocity_jump]: this motion starts stage").count(), 1, "{said}");
     assert!(said.contains("the same warning applies to lines "), "{said}");
 }
+
+#[test]
+fn what_a_stopped_run_has_left_is_not_lost_by_another_command() {
+    let folder = Folder::new("left");
+    folder.write("good.toml", GOOD);
+    fs::create_dir(folder.0.join("out")).unwrap();
+    folder.write("out/checkpoint", "beamsim checkpoint\nof another run");
+    for arguments in [
+        &["verify", "good.toml", "--out", "out"][..],
+        &["run", "good.toml", "--out", "out"],
+        &["run", "good.toml", "--out", "out", "--accuracy", "1e-2"],
+    ] {
+        let output = folder.beamsim(arguments);
+        assert!((status(&output), last_line(&output).starts_with("error[checkpoint]")) == (2, true), "{arguments:?}");
+        assert!(folder.names("out").contains(&"checkpoint".to_string()), "{arguments:?}");
+    }
+}
+
+#[test]
+fn messages_about_tables_name_the_lines_of_the_deck() {
+    let folder = Folder::new("table_lines");
+    let deck =
+        GOOD.replace("section = \"s\"", "section = { csv = \"b.csv\" }").replace("force = [0, 0, \"f\"]", "forced = 1");
+    folder.write("deck.toml", &deck);
+    folder.write("b.csv", "s,EA,GA2,GA3,GJ,EI2,EI3\n0,9,8,7,6,5,4\n1,-1,1,1,1,1,1\n");
+    let line_of = |part: &str| deck.lines().position(|line| line.contains(part)).unwrap() + 1;
+    let output = folder.beamsim(&["check", "deck.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(status(&output), 2);
+    assert!(said.contains(&format!("--> deck.toml:{}:1", line_of("forced"))), "{said}");
+    assert!(said.contains(&format!("--> deck.toml:{}:20", line_of("b.csv"))), "{said}");
+    assert!(said.contains("line 3 of this table"), "{said}");
+}
+
+#[test]
+fn a_parameter_that_no_line_uses_is_refused() {
+    let folder = Folder::new("unused_parameter");
+    folder.write("good.toml", GOOD);
+    let output = folder.beamsim(&["run", "good.toml", "--set", "param.F=1"]);
+    assert_eq!(status(&output), 2);
+    assert!(last_line(&output).contains("the deck has no parameter `F`: did you mean `f`?"), "{}", last_line(&output));
+}
+
+#[test]
+fn warnings_of_runs_of_studies_can_be_denied() {
+    let folder = Folder::new("denied_studies");
+    let column = concat!(env!("CARGO_MANIFEST_DIR"), "/decks/minimal/expect_warns.toml");
+    let text = fs::read_to_string(column).unwrap();
+    folder.write("column.toml", &text[..text.find("[[expect]]").unwrap()]);
+    let sweep = ["sweep", "column.toml", "--vary", "stage.0.steps=4,5", "--output", "top.ux", "--deny-warnings"];
+    for arguments in [&sweep[..], &["effects", "column.toml", "--deny-warnings"]] {
+        let output = folder.beamsim(arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            (status(&output), last_line(&output).starts_with("error[warnings]")) == (1, true),
+            "{arguments:?} {said}"
+        );
+        assert_eq!(status(&folder.beamsim(&arguments[..arguments.len() - 1])), 0, "{arguments:?}");
+    }
+}

@@ -191,6 +191,11 @@ fn wrong_words_for_a_sweep_are_told() {
         let output = folder.beamsim(&[&["sweep", "deck.toml"], words].concat());
         assert!(status(&output) == 2 && last_line(&output).contains(told), "{words:?}: {}", last_line(&output));
     }
+    let both = "deck = \"deck.toml\"\nzip = true\nsample = 2\n[vary]\n\"param.L\" = { from = 1, to = 2 }\n";
+    folder.write("both.toml", both);
+    let output = folder.beamsim(&["sweep", "both.toml"]);
+    assert_eq!(status(&output), 2);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("remove `zip`, or `sample`"));
     assert!(!folder.0.join("results").exists());
 }
 

@@ -202,6 +202,7 @@ fn summarise(plan: &Plan, results: &[Option<PointResult>]) -> Result<(), Command
         }
     }
     json::sweep(&table, results.len(), finished, &failed);
+    console::count_warnings(known.iter().filter(|result| result.warns()).count());
     if failed.is_empty() {
         return Ok(());
     }

@@ -175,7 +175,7 @@ pub enum ComputedShape {
 impl ComputedSection {
     /// A circle, tube or rectangle of one material, without a wanted mesh: where the material is
     /// isotropic, its matrices and stresses have closed forms.
-    pub fn plain(&self) -> Option<(Shape, &Spanned<String>)> {
+    pub fn solid_without_mesh(&self) -> Option<(Shape, &Spanned<String>)> {
         match (&self.shape, &self.material, self.mesh) {
             (ComputedShape::Solid(shape), Some(material), None) => Some((*shape, material)),
             (_, _, _) => None,

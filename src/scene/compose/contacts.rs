@@ -2,14 +2,13 @@
 
 use super::{Composer, DrivenTable, stage_set};
 use crate::deck::{
-    self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, Shape, Spanned, Stage, StageBody,
-    SurfaceMotion,
+    self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, Reference, SectionBody, Shape,
+    Spanned, Stage, StageBody, SurfaceMotion,
 };
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
 use crate::scene::names::{self, unknown};
 use crate::scene::path;
-use crate::scene::section::PlainSection;
 use crate::scene::surfaces;
 use beamsim_core::effect::contact::{
     BeamPairs, Chain, ChainNode, ContactLaws, ContactStiffness, Meeting, SceneSurface, Strand, SurfaceCarrier,
@@ -415,9 +414,14 @@ fn radius_of_sections(deck: &Deck, beam: &str) -> Option<f64> {
     }
     let radius = |name: &Spanned<String>| {
         let section = deck.sections.iter().find(|section| section.name.value == name.value)?;
-        let plain = PlainSection::of(section, deck).ok()??;
-        match plain.shape {
-            Shape::Circle { radius } | Shape::Tube { radius, .. } => (plain.place == [0.0; 2]).then_some(radius),
+        let SectionBody::Computed(body) = &section.body else { return None };
+        // Turned or not, of any material: the line goes through the middle.
+        let is_about_line = match body.reference {
+            None | Some(Reference::Word(_)) => true,
+            Some(Reference::Point(at)) => at == [0.0; 2],
+        };
+        match body.solid_without_mesh()?.0 {
+            Shape::Circle { radius } | Shape::Tube { radius, .. } => is_about_line.then_some(radius),
             Shape::Rectangle { .. } => None,
         }
     };

@@ -38,6 +38,11 @@ impl PointResult {
         Self { status: status.into(), message, ..Self::default() }
     }
 
+    /// True if the run finished with warnings, of which the message then tells.
+    pub fn warns(&self) -> bool {
+        self.finished() && self.message.starts_with("warning[")
+    }
+
     /// True if the run finished.
     pub fn finished(&self) -> bool {
         self.status == "finished"
