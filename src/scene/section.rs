@@ -317,7 +317,7 @@ impl Taper {
         };
         let alike = std::mem::discriminant(&a.shape) == std::mem::discriminant(&b.shape)
             && a.material.value == b.material.value;
-        Ok((alike && factors_alike).then(|| Self { ends: [a, b] }))
+        Ok((alike && factors_alike).then_some(Self { ends: [a, b] }))
     }
 
     /// The section at a part of the way.
