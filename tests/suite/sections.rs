@@ -372,6 +372,9 @@ fn turned_points(points: &[[f64; 2]], angle: f64) -> String {
     format!("[{}]", points.iter().map(point).collect::<Vec<_>>().join(", "))
 }
 
+/// An outline and its holes.
+type Outlined = (Vec<[f64; 2]>, Vec<Vec<[f64; 2]>>);
+
 #[test]
 fn outlines_that_share_edges_mean_what_they_enclose() {
     let square = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
@@ -383,7 +386,7 @@ fn outlines_that_share_edges_mean_what_they_enclose() {
     // A hole that is cut into the outline along a line which is followed to and fro.
     let mut keyhole = square.to_vec();
     keyhole.extend([[0.0, 0.0], [3.0, 3.0], [3.0, 6.0], [6.0, 6.0], [6.0, 3.0], [3.0, 3.0]]);
-    let pairs: [[(Vec<[f64; 2]>, Vec<Vec<[f64; 2]>>); 2]; 4] = [
+    let pairs: [[Outlined; 2]; 4] = [
         [(square.to_vec(), vec![rect([0.0, 3.0], [1.0, 4.0])]), (notched, vec![])],
         [
             (square.to_vec(), vec![rect([2.0, 4.0], [2.0, 5.0]), rect([4.0, 7.0], [2.0, 5.0])]),
