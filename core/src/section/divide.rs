@@ -1,5 +1,8 @@
 //! Division of a line into cells, fine towards its ends where the solution asks for it.
 
+/// Cells of a line, at most: with more the mesh is refused for its number of nodes.
+const MOST_CELLS: f64 = 1e6;
+
 /// The behaviour of the solution at an end of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum End {
@@ -44,7 +47,8 @@ pub fn divide(length: f64, ends: [End; 2], least: f64, density: f64) -> Vec<f64>
             - ends[1].cells(length - distance, density, length)
     };
     let total = wanted(1.0);
-    let count = (total - 1e-9).ceil().max(1.0) as usize;
+    // A ply that rounding leaves without thickness asks for infinitely many: its elements are refused.
+    let count = if total.is_finite() { (total - 1e-9).ceil().clamp(1.0, MOST_CELLS) as usize } else { 1 };
     let mut points: Vec<f64> = (0..=count).map(|k| invert(&wanted, total * k as f64 / count as f64)).collect();
     points[0] = 0.0;
     points[count] = 1.0;
@@ -75,6 +79,14 @@ fn invert(function: &impl Fn(f64) -> f64, value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_without_length_or_measure_have_a_bounded_number_of_cells() {
+        let singular = [End::Smooth, End::Singular { radius: 0.0 }];
+        assert_eq!(divide(0.0, singular, 4.0, 3.0), [0.0, 1.0]);
+        assert_eq!(divide(1.0, [End::Layer { thickness: 0.0 }, End::Smooth], 4.0, 3.0), [0.0, 1.0]);
+        assert_eq!(divide(1.0, [End::Smooth; 2], f64::INFINITY, 3.0), [0.0, 1.0]);
+    }
 
     #[test]
     fn smooth_lines_have_equal_cells() {
