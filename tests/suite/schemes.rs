@@ -323,6 +323,22 @@ fn adaptive_steps_forget_a_jump_of_accelerations() {
     }
 }
 
+/// A ball that bounces twice; the place at the end is that of the equations of motion, integrated by a method of order
+/// eight (DOP853).
+#[test]
+fn adaptive_steps_forget_impacts() {
+    for scheme in ["generalized_alpha", "newmark", "hht"] {
+        let run = simulate(&format!(
+            "gravity = [0, 0, -10]\n[point]\na = [0, 0, 1.1]\n[[body]]\nat = \"a\"\nmass = 1\n[[surface]]\nname = \"f\"\n\
+             kind = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n[[contact]]\nname = \"c\"\nnodes = [\"a\"]\n\
+             surfaces = [\"f\"]\nradius = 0.1\nstiffness = 1e5\npenetration = 0.1\n[[stage]]\nkind = \"dynamic\"\nend = 2\n\
+             step = 0.01\nscheme = \"{scheme}\"\nadaptive = true\nstep_tolerance = 1e-6\n[output]\ncolumns = [\"x\"]\n"
+        ));
+        let z = run.end("a.z");
+        assert!((z - 0.917237).abs() < 1e-5, "{scheme}: {z}");
+    }
+}
+
 /// Of a free body over increments the error is of order four, and so few steps are enough.
 #[test]
 fn adaptive_steps_know_what_increments_are_good_at() {

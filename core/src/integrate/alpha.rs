@@ -142,6 +142,7 @@ impl Step {
     /// [`Stretch`]. The stage must have begun with [`Scheme::start`].
     pub fn predict(&self, state: &mut State, before: f64) {
         debug_assert_ne!(self.scheme.has_algorithmic(), state.algorithmic.is_empty(), "the scheme was not started");
+        debug_assert_eq!(state.algorithmic.len(), state.earlier.len(), "the scheme was not started");
         let Scheme { beta, gamma, alpha_m, .. } = self.scheme;
         let h = self.length;
         let stretch = Stretch::new(h, before, self.scheme.lag());
@@ -152,10 +153,8 @@ impl Step {
                     (v[k], a[k]) = turn.rates(q[k]);
                     continue;
                 }
-                let old = match (algorithmic.get(k), earlier.get(k)) {
-                    (Some(own), Some(earlier)) => stretch.of(*own, a[k], *earlier),
-                    (_, _) => a[k],
-                };
+                let known = algorithmic.get(k).zip(earlier.get(k));
+                let old = known.map_or(a[k], |(own, earlier)| stretch.of(*own, a[k], *earlier));
                 let new = if alpha_m == 0.0 { a[k] } else { (a[k] - old * alpha_m) * (1.0 / (1.0 - alpha_m)) };
                 q[k] += v[k] * h + (old * (0.5 - beta) + new * beta) * (h * h);
                 v[k] += (old * (1.0 - gamma) + new * gamma) * h;

@@ -144,7 +144,7 @@ impl SlotError {
         let own = self.algorithmic;
         // Of an error all of the lag is taken for smooth: fixed steps change their length rarely, and an
         // error that is too large is told rather than one that is too small.
-        let old = stretch.of(own, self.rate2, Vec3([f64::NAN; 3]));
+        let old = stretch.of_smooth(own, self.rate2);
         let new = (self.rate2 * alpha_f - old * alpha_m) * (1.0 / (1.0 - alpha_m));
         Predicted {
             error: self.error + self.rate * h + (old * (0.5 - beta) + new * beta) * (h * h),

@@ -104,15 +104,21 @@ impl Stretch {
         Self { ratio: length / before, lag }
     }
 
-    /// A0 for the new step from `own`, that of the step before, with a0 (`now`) and a_1 (`earlier`);
-    /// a_1 is NaN where it is not known.
+    /// A0 for the new step from `own`, that of the step before, with a0 (`now`) and a_1 (`earlier`),
+    /// which is NaN after a change of chart.
     #[inline]
     pub fn of(self, own: Vec3, now: Vec3, earlier: Vec3) -> Vec3 {
-        if self.ratio == 1.0 {
-            return own;
+        if self.ratio == 1.0 || earlier.0[0].is_nan() {
+            return self.of_smooth(own, now);
         }
-        let smooth = if earlier.0[0].is_nan() { own - now } else { (now - earlier) * self.lag };
+        let smooth = (now - earlier) * self.lag;
         now + smooth * self.ratio + (own - now - smooth) * (1.0 / self.ratio).min(1.0)
+    }
+
+    /// A0 for the new step where all of A0 - a0 counts as smooth.
+    #[inline]
+    pub fn of_smooth(self, own: Vec3, now: Vec3) -> Vec3 {
+        if self.ratio == 1.0 { own } else { now + (own - now) * self.ratio }
     }
 }
 
