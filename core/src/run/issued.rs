@@ -24,6 +24,8 @@ pub(super) struct IssuedWarnings {
     pub(super) moved: f64,
     /// That the account of the energy is off
     pub(super) unbalanced: bool,
+    /// That supports or motions have changed velocities at the start of a dynamic stage
+    pub(super) caught: bool,
     /// The stage in which the plane would be left
     pub(super) unstable: Option<usize>,
 }
@@ -41,6 +43,7 @@ impl Default for IssuedWarnings {
             subdivision: false,
             moved: 0.0,
             unbalanced: false,
+            caught: false,
             unstable: None,
         }
     }

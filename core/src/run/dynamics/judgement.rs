@@ -46,11 +46,7 @@ impl Dynamics<'_, '_> {
             let why = if gained > 0.0 && self.stage.state.contacts.taken_over > OWN_PART * gained {
                 "the springs that hold the contact forces of a static stage in this one store energy that no load \
                  gave (give the contact a larger `stiffness`)"
-            } else if self.has_caught
-                || self.stage.plan.stages[..self.stage.number]
-                    .iter()
-                    .all(|stage| stage.work.kind() != StageKind::Static)
-            {
+            } else if self.stage.issued.caught || !self.follows_static_stage() {
                 "what acts changes at once between stages: supports that catch what moves, springs that are added or \
                  removed under load"
             } else {
@@ -74,6 +70,11 @@ impl Dynamics<'_, '_> {
             );
             self.stage.warn(WarningKind::EnergyGain, message);
         }
+    }
+
+    /// True if some stage before this one is static.
+    fn follows_static_stage(&self) -> bool {
+        self.stage.plan.stages[..self.stage.number].iter().any(|stage| stage.work.kind() == StageKind::Static)
     }
 
     /// Contacts whose penalty is too soft, or too stiff for the steps.

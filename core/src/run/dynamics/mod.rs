@@ -52,8 +52,6 @@ pub(super) struct Dynamics<'s, 'r> {
     /// Watches the energy of time steps; not in linear stages, whose account takes as long as their
     /// steps.
     guard: Option<EnergyGuard>,
-    /// Supports or motions have changed velocities at the start of the stage.
-    has_caught: bool,
 }
 
 impl<'s, 'r> Dynamics<'s, 'r> {
@@ -72,7 +70,6 @@ impl<'s, 'r> Dynamics<'s, 'r> {
             massive: Vec::new(),
             rateless: Vec::new(),
             guard,
-            has_caught: false,
             stage,
         }
     }

@@ -22,29 +22,13 @@ const ROUND_OFF: f64 = 1e-9;
 impl Dynamics<'_, '_> {
     /// Gives velocities, sets the clock, and finds the accelerations of the start.
     pub(super) fn start(&mut self) -> Result<(), Failure> {
-        let StageRun { state, number, .. } = &*self.stage;
-        if state.time >= self.settings.end {
-            return Err(Failure::Deck(format!(
-                "stage {} ends at `end` = {}, but the stages before it have reached the time {} (`end` is a time, not a \
-                 duration)",
-                number + 1,
-                self.settings.end,
-                state.time
-            )));
-        }
+        self.refuse_past_end()?;
         let held = self.held_velocities();
         let begins = self.set_in_motion();
         self.set_clock()?;
-        let mut caught = held.and_then(|held| self.caught(&held));
+        let caught = held.and_then(|held| self.caught(&held));
         self.stage.refuse_penetration()?;
-        let before = caught.is_some().then(|| self.stage.state.q.clone());
-        self.stage.change_charts(None);
-        if let (Some(caught), Some(before)) = (&mut caught, before) {
-            // In another chart a rotation has other rates: its impulse is left out.
-            let is_changed = |slot: &usize| self.stage.state.q[*slot] != before[*slot];
-            (0..before.len()).filter(is_changed).for_each(|slot| caught[slot] = Vec3::ZERO);
-        }
-        self.has_caught = caught.is_some();
+        let caught = self.change_charts_with(caught);
         self.stage.linearise()?;
         let step = self.first_step();
         self.refuse_loose(&step)?;
@@ -80,6 +64,21 @@ impl Dynamics<'_, '_> {
         begins
     }
 
+    /// Refuses a stage whose end lies behind it: a stage before it has not come to its `until`.
+    fn refuse_past_end(&self) -> Result<(), Failure> {
+        let StageRun { state, number, .. } = &*self.stage;
+        let end = self.settings.end;
+        if state.time < end {
+            return Ok(());
+        }
+        Err(Failure::Deck(format!(
+            "stage {} ends at `end` = {end}, but the stages before it have reached the time {} (`end` is a time, not a \
+             duration)",
+            number + 1,
+            state.time
+        )))
+    }
+
     /// The velocities in held directions where a motion goes on from the stage before; `None` without
     /// one.
     fn held_velocities(&self) -> Option<Vec<Vec3>> {
@@ -88,8 +87,22 @@ impl Dynamics<'_, '_> {
         past.moving.then(|| threads::list(state.v.len(), |slot| dof_map.held_part(slot as Slot, state.v[slot])))
     }
 
+    /// Changes charts, and keeps the changes of velocities of rotations whose chart stays: in another
+    /// one rates are others, and the impulse of those is left out.
+    fn change_charts_with(&mut self, caught: Option<Vec<Vec3>>) -> Option<Vec<Vec3>> {
+        let Some(mut caught) = caught else {
+            self.stage.change_charts(None);
+            return None;
+        };
+        let before = self.stage.state.q.clone();
+        self.stage.change_charts(None);
+        let is_changed = |slot: &usize| self.stage.state.q[*slot] != before[*slot];
+        (0..before.len()).filter(is_changed).for_each(|slot| caught[slot] = Vec3::ZERO);
+        Some(caught)
+    }
+
     /// The changes of the velocities in held directions, which were `held` before: where supports and
-    /// motions act that did not act before. `None` without such.
+    /// motions act that did not act before. `None` without such. Supports are told.
     fn caught(&mut self, held: &[Vec3]) -> Option<Vec<Vec3>> {
         let StageRun { state, assembly, model, .. } = &*self.stage;
         let dof_map = &assembly.system.pattern.dof_map;
@@ -100,19 +113,30 @@ impl Dynamics<'_, '_> {
             size > ROUND_OFF * held[*slot].norm().max(state.v[*slot].norm()) && !model.kinds[*slot].is_multiplier()
         };
         let slots: Vec<usize> = (0..held.len()).filter(is_change).collect();
-        let acting = || self.stage.schedule.motions(model).filter(|(_, timeline)| timeline.acts());
-        let by_support = slots.iter().filter(|&&slot| acting().all(|(motion, _)| motion.slot as usize != slot));
-        if let Some(&slot) = by_support.into_iter().max_by(|a, b| caught[**a].norm().total_cmp(&caught[**b].norm())) {
-            let (node, stage) = (model.node_at(slot), self.stage.number + 1);
-            self.stage.warn(
-                WarningKind::VelocityJump,
-                format!(
-                    "supports of stage {stage} stop what moves, the fastest at node \"{node}\": their impulse on all \
-                     that is connected takes kinetic energy at once"
-                ),
-            );
+        if slots.is_empty() {
+            return None;
         }
-        (!slots.is_empty()).then_some(caught)
+        self.stage.issued.caught = true;
+        self.warn_of_catch(&slots, &caught);
+        Some(caught)
+    }
+
+    /// Warns of supports among the `slots` whose velocities change; motions that begin with a velocity
+    /// are told when the deck is read.
+    fn warn_of_catch(&mut self, slots: &[usize], caught: &[Vec3]) {
+        let StageRun { schedule, model, .. } = &*self.stage;
+        let is_moved = |slot: usize| {
+            schedule.motions(model).any(|(motion, timeline)| timeline.acts() && motion.slot as usize == slot)
+        };
+        let by_support = slots.iter().copied().filter(|&slot| !is_moved(slot));
+        let fastest = by_support.max_by(|&a, &b| caught[a].norm().total_cmp(&caught[b].norm()));
+        let Some(slot) = fastest else { return };
+        let (node, stage) = (model.node_at(slot), self.stage.number + 1);
+        let message = format!(
+            "supports of stage {stage} stop what moves, the fastest at node \"{node}\": their impulse on all that is \
+             connected takes kinetic energy at once"
+        );
+        self.stage.warn(WarningKind::VelocityJump, message);
     }
 
     /// Sets the clock, and all accelerations but prescribed ones to zero; motors and surfaces must not

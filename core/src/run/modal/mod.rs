@@ -99,8 +99,8 @@ impl Modal<'_, '_> {
         }
         let stage = self.stage.number + 1;
         let message = format!(
-            "stage {stage} begins in motion, and rotates at up to {spin:.3e} rad per unit of time: its modes are those of the same shape at \
-             rest (a steady rotation of the whole is a `frame` of a static stage)"
+            "stage {stage} begins in motion, and nodes rotate at up to {spin:.3e} rad per unit of time: its modes are those \
+             of the same shape at rest (for a steady rotation of the whole use a static stage with `frame`)"
         );
         self.stage.warn(WarningKind::OutOfBalance, message);
     }
