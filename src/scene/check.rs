@@ -4,7 +4,7 @@ use super::compose::Composition;
 use super::contacts;
 use super::mesh::Mesh;
 use super::scheme::coefficients;
-use super::section::{self, PlainSection, contraction};
+use super::section::{self, contraction, solid_material};
 use crate::deck::{self, Deck, Diagnostic, Elastic, LoadTarget, MotionWhat, SectionBody, Spanned, StageBody};
 use beamsim_core::integrate::Stages;
 use beamsim_core::model::{StageSet, Support};
@@ -14,8 +14,8 @@ use beamsim_core::warning::WarningKind;
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::{HashMap, HashSet};
 
-/// Part by which the stiffness of a taper may exceed that of linear dimensions without a warning: a
-/// stiffness that grows threefold
+/// Part by which the stiffness of a taper may exceed that of linear dimensions without a warning: that
+/// of a stiffness that grows by a factor of 2.9
 const LARGEST_EXCESS: f64 = 0.11;
 
 /// Checks names, stages, and what a stage needs.
@@ -81,14 +81,12 @@ fn warn_of_sections(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     let is_used = |name: &str| deck.beams.iter().any(|beam| beam.sections.iter().any(|own| own.value == name));
     let used = || deck.sections.iter().filter(|section| is_used(&section.name.value));
     diagnostics.extend(used().filter_map(|section| super::computed::warning(section, deck)));
-    let is_plain_of = |section: &deck::Section, material: &str| {
-        let plain = PlainSection::of(section, deck).ok().flatten();
-        plain.is_some_and(|plain| plain.material.value == material)
-    };
+    let is_solid_of =
+        |section: &deck::Section, material: &str| solid_material(section).is_some_and(|name| name.value == material);
     for material in &deck.materials {
         let name = &material.name;
         let Elastic::Isotropic(elastic) = material.elastic else { continue };
-        if contraction(&elastic) == elastic.poisson || !used().any(|section| is_plain_of(section, &name.value)) {
+        if contraction(&elastic) == elastic.poisson || !used().any(|section| is_solid_of(section, &name.value)) {
             continue;
         }
         let message = format!(
@@ -168,8 +166,7 @@ fn missing_mass(deck: &Deck, section: &deck::Section) -> Option<Missing> {
         SectionBody::Full { mass: None, .. } => Some(Missing { key: "`mass`", zero: "a `mass` of zeros" }),
         SectionBody::Computed(body) => {
             let without = !super::computed::has_density(body, deck);
-            let key =
-                if body.solid_without_mesh().is_some() { "a material with `rho`" } else { "materials with `rho`" };
+            let key = if solid_material(section).is_some() { "a material with `rho`" } else { "materials with `rho`" };
             without.then_some(Missing { key, zero: "`rho = 0`" })
         }
         SectionBody::Resultants { mass: Some(_), .. } | SectionBody::Full { mass: Some(_), .. } => None,

@@ -3,8 +3,8 @@
 use super::along::Along;
 use super::computed;
 use crate::deck::{
-    self, Deck, Diagnostic, EffectWord, Effects, Elastic, Isotropic, Reference, SectionBody, Shape, ShearFactor, Span,
-    Spanned, StationsWord,
+    self, Deck, Diagnostic, EffectWord, Effects, Elastic, Isotropic, SectionBody, Shape, ShearFactor, Span, Spanned,
+    StationsWord,
 };
 use beamsim_core::kernel::inertia::Inertia;
 use beamsim_core::model::beam_element::body_inertia;
@@ -250,12 +250,10 @@ pub fn matrices(section: &deck::Section, deck: &Deck) -> Result<SectionMatrices,
 }
 
 /// A circle, tube or rectangle of an isotropic material: its matrices and stresses have closed forms.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct PlainSection {
     /// Shape and dimensions
     pub(super) shape: Shape,
-    /// Name of the material
-    pub(super) material: Spanned<String>,
     /// Constants of the material, with Poisson's ratio as [`contraction`] has it
     pub(super) elastic: Isotropic,
     /// Density, where given
@@ -277,13 +275,8 @@ impl PlainSection {
         let Elastic::Isotropic(elastic) = found.elastic else { return Ok(None) };
         let elastic = Isotropic { poisson: contraction(&elastic), ..elastic };
         let deck::ComputedSection { shear_factor, turn, .. } = **body;
-        // All centres of these shapes are their middle.
-        let place = match body.reference {
-            Some(Reference::Point(at)) => at,
-            Some(Reference::Word(_)) | None => [0.0; 2],
-        };
-        let (material, density) = (material.clone(), found.density);
-        Ok(Some(Self { shape, material, elastic, density, shear_factor, place, turn }))
+        let place = body.place_of_solid();
+        Ok(Some(Self { shape, elastic, density: found.density, shear_factor, place, turn }))
     }
 
     /// Stiffness and mass about the line of the beam.
@@ -309,27 +302,40 @@ impl Taper {
         let [Some(a), Some(b)] = [PlainSection::of(ends[0], deck)?, PlainSection::of(ends[1], deck)?] else {
             return Ok(None);
         };
-        let factors_alike = match (a.shear_factor, b.shear_factor) {
-            (None, None)
-            | (Some(ShearFactor::Energy), Some(ShearFactor::Energy))
-            | (Some(ShearFactor::Given(_)), Some(ShearFactor::Given(_))) => true,
-            (None | Some(_), None | Some(_)) => false,
-        };
-        let alike = std::mem::discriminant(&a.shape) == std::mem::discriminant(&b.shape)
-            && a.material.value == b.material.value;
-        Ok((alike && factors_alike).then_some(Self { ends: [a, b] }))
+        let [material, other] = ends.map(|section| solid_material(section).map(|name| &name.value));
+        let alike = std::mem::discriminant(&a.shape) == std::mem::discriminant(&b.shape) && material == other;
+        let has_factors = blend_factors([a.shear_factor, b.shear_factor], 0.0).is_some();
+        Ok((alike && has_factors).then_some(Self { ends: [a, b] }))
     }
 
     /// The section at a part of the way.
     pub fn at(&self, s: f64) -> PlainSection {
-        let [a, b] = &self.ends;
-        let shear_factor = match (a.shear_factor, b.shear_factor) {
-            (Some(ShearFactor::Given(a)), Some(ShearFactor::Given(b))) => Some(ShearFactor::Given(mix_each(a, b, s))),
-            (one, other) => one.or(other),
-        };
+        let [a, b] = self.ends;
+        let shear_factor = blend_factors([a.shear_factor, b.shear_factor], s).flatten();
         let place = mix_each(a.place, b.place, s);
         let turn = mix(a.turn, b.turn, s);
-        PlainSection { shape: blend_shapes([a.shape, b.shape], s), shear_factor, place, turn, ..a.clone() }
+        PlainSection { shape: blend_shapes([a.shape, b.shape], s), shear_factor, place, turn, ..a }
+    }
+}
+
+/// The name of the material of a circle, tube or rectangle without a wanted mesh; `None` for others.
+pub fn solid_material(section: &deck::Section) -> Option<&Spanned<String>> {
+    match &section.body {
+        SectionBody::Computed(body) => body.solid_without_mesh().map(|(_, material)| material),
+        SectionBody::Resultants { .. } | SectionBody::Full { .. } => None,
+    }
+}
+
+/// The shear factors at a part of the way between two; `None` where both are of different kinds.
+fn blend_factors([a, b]: [Option<ShearFactor>; 2], s: f64) -> Option<Option<ShearFactor>> {
+    match (a, b) {
+        (None, None) => Some(None),
+        (Some(ShearFactor::Energy), Some(ShearFactor::Energy)) => Some(Some(ShearFactor::Energy)),
+        (Some(ShearFactor::Given(a)), Some(ShearFactor::Given(b))) => Some(Some(ShearFactor::Given(mix_each(a, b, s)))),
+        (None, Some(ShearFactor::Energy | ShearFactor::Given(_)))
+        | (Some(ShearFactor::Energy | ShearFactor::Given(_)), None)
+        | (Some(ShearFactor::Energy), Some(ShearFactor::Given(_)))
+        | (Some(ShearFactor::Given(_)), Some(ShearFactor::Energy)) => None,
     }
 }
 

@@ -3,7 +3,7 @@
 use super::computed::{self, Solution, SolvedSection};
 use super::figure::SectionsAtNodes;
 use super::mesh::{Mesh, MeshBeam};
-use super::section::{PlainSection, Taper, find_material};
+use super::section::{PlainSection, Taper, find_material, solid_material};
 use super::{names, path};
 use crate::deck::{self, Beam, CornerWord, Deck, Diagnostic, SectionBody, Shape, Span, Spanned, Strength};
 use beamsim_core::section::closed::{ClosedForm, ClosedShape};
@@ -151,7 +151,7 @@ impl<'d> SectionStresses<'d> {
         let [first, second] = ends;
         if let Some(taper) = Taper::new(ends, self.deck)? {
             let name = format!("{}-{}", first.name.value, second.name.value);
-            return Ok(Arc::new(closed(&name, &taper.at(along), self.deck)?));
+            return Ok(Arc::new(closed(&name, &taper.at(along), law_of_solid(first, self.deck)?)));
         }
         for section in ends {
             self.of_section(section, span)?;
@@ -238,7 +238,7 @@ pub fn recovery(section: &deck::Section, deck: &Deck, span: &Span) -> Result<Rec
     let SolvedSection { solution, place, .. } = solved(section, deck, span)?;
     let name = &section.name.value;
     if let Some(plain) = PlainSection::of(section, deck)? {
-        return closed(name, &plain, deck);
+        return Ok(closed(name, &plain, law_of_solid(section, deck)?));
     }
     let (SectionBody::Computed(body), Some(Solution { analysis, materials, origin })) = (&section.body, solution)
     else {
@@ -264,8 +264,7 @@ fn broken(section: &deck::Section, error: &beamsim_core::section::SectionError, 
 }
 
 /// The stresses of a section that has closed forms.
-fn closed(name: &str, plain: &PlainSection, deck: &Deck) -> Result<Recovery, Diagnostic> {
-    let law = failure_law(find_material(&plain.material, &deck.materials)?);
+fn closed(name: &str, plain: &PlainSection, law: Option<FailureLaw>) -> Recovery {
     let shape = match plain.shape {
         Shape::Circle { radius } => ClosedShape::Ring { radii: [0.0, radius] },
         Shape::Tube { radius, thickness } => ClosedShape::Ring { radii: [radius - thickness, radius] },
@@ -273,7 +272,13 @@ fn closed(name: &str, plain: &PlainSection, deck: &Deck) -> Result<Recovery, Dia
     };
     let form = ClosedForm::new(shape, plain.elastic.poisson);
     let placement = Placement { line: plain.place, turn: plain.turn, origin: [0.0; 2] };
-    Ok(Recovery::closed(name, form, placement, law))
+    Recovery::closed(name, form, placement, law)
+}
+
+/// The law of the material of a circle, tube or rectangle.
+fn law_of_solid(section: &deck::Section, deck: &Deck) -> Result<Option<FailureLaw>, Diagnostic> {
+    let material = solid_material(section).map(|name| find_material(name, &deck.materials)).transpose()?;
+    Ok(material.and_then(failure_law))
 }
 
 /// The law of a material that has strengths.

@@ -287,7 +287,8 @@ impl Boundaries {
                 filled.entry(at.map(f64::to_bits)).or_insert((at, 0.0)).1 += outline.interior_angle(k);
             }
         }
-        // About a point of a hole the material of its region counts once for each outline there.
+        // Around a hole the material fills what the hole leaves of a turn. At a point of several outlines of
+        // a region the sum has a whole turn too many for each outline but one.
         let within_turn = |angle: f64| if angle > TAU + ROUND_OFF { angle.rem_euclid(TAU) } else { angle };
         let mut corners: Vec<_> = filled.into_values().map(|(at, angle)| (at, within_turn(angle))).collect();
         corners.retain(|(_, angle)| *angle > PI + CORNER_ANGLE && *angle < TAU - CORNER_ANGLE);

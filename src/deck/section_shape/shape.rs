@@ -181,6 +181,15 @@ impl ComputedSection {
             (_, _, _) => None,
         }
     }
+
+    /// The point of a circle, tube or rectangle of one material through which the line of the beam goes:
+    /// all centres of these shapes are their middle.
+    pub fn place_of_solid(&self) -> [f64; 2] {
+        match self.reference {
+            Some(Reference::Point(at)) => at,
+            Some(Reference::Word(_)) | None => [0.0; 2],
+        }
+    }
 }
 
 impl ComputedShape {

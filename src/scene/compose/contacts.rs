@@ -2,8 +2,8 @@
 
 use super::{Composer, DrivenTable, stage_set};
 use crate::deck::{
-    self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, Reference, SectionBody, Shape,
-    Spanned, Stage, StageBody, SurfaceMotion,
+    self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, SectionBody, Shape, Spanned, Stage,
+    StageBody, SurfaceMotion,
 };
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
@@ -415,13 +415,11 @@ fn radius_of_sections(deck: &Deck, beam: &str) -> Option<f64> {
     let radius = |name: &Spanned<String>| {
         let section = deck.sections.iter().find(|section| section.name.value == name.value)?;
         let SectionBody::Computed(body) = &section.body else { return None };
-        // Turned or not, of any material: the line goes through the middle.
-        let is_about_line = match body.reference {
-            None | Some(Reference::Word(_)) => true,
-            Some(Reference::Point(at)) => at == [0.0; 2],
-        };
-        match body.solid_without_mesh()?.0 {
-            Shape::Circle { radius } | Shape::Tube { radius, .. } => is_about_line.then_some(radius),
+        let (shape, _) = body.solid_without_mesh()?;
+        match shape {
+            Shape::Circle { radius } | Shape::Tube { radius, .. } => {
+                (body.place_of_solid() == [0.0; 2]).then_some(radius)
+            }
             Shape::Rectangle { .. } => None,
         }
     };
