@@ -34,33 +34,8 @@ impl<'t> Home<'t> {
     /// have another value for the same key, some are missing, some new.
     pub(super) fn new(own: &'t str, whole: &'t str, tables: &'t [ImportedTable]) -> Self {
         let (own_lines, whole_lines) = (lines(own), lines(whole));
-        let mut next = 0;
-        let mut origins = Vec::with_capacity(whole_lines.len());
-        for range in &whole_lines {
-            let line = &whole[range.clone()];
-            let is_same = |number: usize| own_lines.get(number).is_some_and(|own_line| own[own_line.clone()] == *line);
-            let has_key = |number: usize| {
-                let key = |line: &str| line.split_once('=').map(|(key, _)| key.trim().to_string());
-                own_lines.get(number).is_some_and(|own_line| {
-                    let found = key(&own[own_line.clone()]);
-                    found.is_some() && found == key(line)
-                })
-            };
-            let is_made = line.contains(FROM);
-            let is_header = line.trim_start().starts_with('[');
-            let found = if is_same(next) || !is_made && has_key(next) {
-                Some(next)
-            } else if is_made {
-                None
-            } else {
-                // Empty lines stand before tables that are new, too.
-                let most = if is_header { own_lines.len() } else { MOST_MISSING };
-                let mut ahead = next + 1..=next + most;
-                ahead.find(|&number| is_same(number) && !line.trim().is_empty())
-            };
-            next = found.map_or(next, |number| number + 1);
-            origins.push(found);
-        }
+        let of = |text: &'t str, ranges: &[Range<usize>]| ranges.iter().map(|range| &text[range.clone()]).collect();
+        let origins = origins(of(own, &own_lines), of(whole, &whole_lines));
         Self { own, whole, own_lines, whole_lines, origins, tables }
     }
 
@@ -124,6 +99,30 @@ impl<'t> Home<'t> {
         let start = part.start + self.own[part].find(&format!("\"{name}\""))? + 1;
         Some(start..start + name.len())
     }
+}
+
+/// The line of the user that each line of the whole is, or whose key it has.
+fn origins(own: Vec<&str>, whole: Vec<&str>) -> Vec<Option<usize>> {
+    let key = |line: &str| line.split_once('=').map(|(key, _)| key.trim().to_string());
+    let mut next = 0;
+    let mut origins = Vec::with_capacity(whole.len());
+    for line in whole {
+        let is_same = |number: usize| own.get(number).is_some_and(|own| *own == line);
+        let has_key = |number: usize| own.get(number).is_some_and(|own| key(own).is_some() && key(own) == key(line));
+        let is_made = line.contains(FROM);
+        let found = if is_same(next) || !is_made && has_key(next) {
+            Some(next)
+        } else if is_made || line.trim().is_empty() {
+            // Empty lines stand before tables that are new, too.
+            None
+        } else {
+            let most = if line.trim_start().starts_with('[') { own.len() } else { MOST_MISSING };
+            (next + 1..=next + most).find(|&number| is_same(number))
+        };
+        next = found.map_or(next, |number| number + 1);
+        origins.push(found);
+    }
+    origins
 }
 
 /// The lines of a text without their ends.

@@ -27,6 +27,9 @@ pub struct Imported {
 impl Imported {
     /// Messages about the text with the rows of tables, as messages about the text `own` of the user.
     pub fn at_home(&self, own: &str, found: &[Diagnostic]) -> Vec<Diagnostic> {
+        if found.is_empty() || self.tables.is_empty() {
+            return found.to_vec();
+        }
         let home = Home::new(own, &self.text, &self.tables);
         found.iter().map(|diagnostic| home.of(diagnostic.clone())).collect()
     }

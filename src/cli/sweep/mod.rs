@@ -202,7 +202,7 @@ fn summarise(plan: &Plan, results: &[Option<PointResult>]) -> Result<(), Command
         }
     }
     json::sweep(&table, results.len(), finished, &failed);
-    console::count_warnings(known.iter().filter(|result| result.warns()).count());
+    console::count_warnings(known.iter().filter(|result| result.finished()).map(|result| result.warnings).sum());
     if failed.is_empty() {
         return Ok(());
     }

@@ -27,6 +27,9 @@ pub struct PointResult {
     pub(super) work: [u64; 3],
     /// Wall-clock seconds
     pub(crate) seconds: f64,
+    /// The number of warnings of a run that finished
+    #[serde(default)]
+    pub(crate) warnings: usize,
 }
 
 impl PointResult {
@@ -36,11 +39,6 @@ impl PointResult {
     /// The result of a point that failed.
     pub fn failed(status: &str, message: String) -> Self {
         Self { status: status.into(), message, ..Self::default() }
-    }
-
-    /// True if the run finished with warnings, of which the message then tells.
-    pub fn warns(&self) -> bool {
-        self.finished() && self.message.starts_with("warning[")
     }
 
     /// True if the run finished.
@@ -76,6 +74,7 @@ fn simulate(text: &str, built: BuiltDeck, error_bars: bool, interrupted: &dyn Fn
     let outcome = PointResult {
         work: [counters.steps, counters.work.iterations, counters.work.factorisations],
         seconds: run.seconds,
+        warnings: counters.findings.warnings.len(),
         ..PointResult::default()
     };
     let failed = |failure: Failure, outcome| PointResult {
