@@ -13,6 +13,7 @@
 //! constrains, has a negative pivot. For any W, the inertia on the space that satisfies the
 //! constraints is that of the tangent (congruence with [I, C W/2; 0, I]), and so is the solution.
 
+use crate::model::SlotKind;
 use crate::system::{DofMap, Matrix, Pattern, Slot, System};
 use std::collections::BTreeMap;
 
@@ -20,11 +21,16 @@ use std::collections::BTreeMap;
 /// that these remain stiff when they lose their own stiffness.
 const RELATIVE_WEIGHT: f64 = 8.0;
 
-/// A stiffness below this part of the largest one of a constraint is round-off, such as that of the
-/// sliding along a line that is nearly straight: a weight from it would leave a pivot of round-off.
+/// A stiffness below this part of the largest one of a constraint against the same kind of motion is
+/// round-off, such as that of the sliding along a line that is nearly straight: a weight from it
+/// would leave a pivot of round-off.
 const NEGLIGIBLE: f64 = 1e-12;
 
+/// Stiffnesses against displacements and against rotations, which have different units.
+type ByKind = [f64; 2];
+
 /// The multipliers of a pattern, and the values of the last prepared tangent.
+#[derive(Clone)]
 pub struct Constraints {
     rows: Vec<Multiplier>,
     additions: Vec<WeightedProduct>,
@@ -36,6 +42,7 @@ pub struct Constraints {
 }
 
 /// Equation of a multiplier and the unknowns it constrains.
+#[derive(Clone)]
 struct Multiplier {
     equation: u32,
     ties: Vec<ConstrainedUnknown>,
@@ -43,8 +50,11 @@ struct Multiplier {
 
 /// An unknown that a multiplier constrains, with the positions of its entries of C, of B and of the
 /// diagonal.
+#[derive(Clone)]
 struct ConstrainedUnknown {
     equation: u32,
+    /// Index in [`ByKind`]
+    kind: usize,
     of_column: usize,
     of_row: usize,
     diagonal: usize,
@@ -52,6 +62,7 @@ struct ConstrainedUnknown {
 
 /// An entry of C W B: the position it is added to, the index of the multiplier, and the positions
 /// of its factors in C and B.
+#[derive(Clone)]
 struct WeightedProduct {
     place: usize,
     row: usize,
@@ -60,15 +71,23 @@ struct WeightedProduct {
 }
 
 impl Constraints {
-    /// Constraints of the given multiplier slots; `None` if they have no equation.
-    pub fn new(pattern: &Pattern, multipliers: &[Slot]) -> Option<Self> {
-        let equations = multipliers.iter().flat_map(|&slot| pattern.dof_map.of(slot));
-        let equations: Vec<u32> = equations.filter(|&equation| equation != DofMap::HELD).collect();
+    /// Constraints of the slots that are multipliers, among slots of these kinds; `None` if they
+    /// have no equation.
+    pub fn new(pattern: &Pattern, kinds: &[SlotKind]) -> Option<Self> {
+        let slots_of = |is_one: fn(SlotKind) -> bool| {
+            (0..).zip(kinds).filter(move |(_, kind)| is_one(**kind)).map(|(slot, _)| slot as Slot)
+        };
+        let equations_of = |slot: Slot| pattern.dof_map.of(slot).into_iter().filter(|&at| at != DofMap::HELD);
+        let multipliers: Vec<Slot> = slots_of(SlotKind::is_multiplier).collect();
+        let equations: Vec<u32> = multipliers.iter().flat_map(|&slot| equations_of(slot)).collect();
         if equations.is_empty() {
             return None;
         }
         let mut is_multiplier = vec![false; pattern.dof_map.count()];
         equations.iter().for_each(|&equation| is_multiplier[equation as usize] = true);
+        let mut is_rotation = vec![false; pattern.dof_map.count()];
+        let rotations = slots_of(|kind| kind == SlotKind::Rotation).flat_map(equations_of);
+        rotations.for_each(|equation| is_rotation[equation as usize] = true);
         let mut columns: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
         let mut place = |row: u32, column: u32| {
             let entries = || pattern.entries(column).map(|entry| (entry.row, entry.place)).collect();
@@ -82,7 +101,8 @@ impl Constraints {
             let tie = |other: u32| {
                 let of_column = place(other, equation)?;
                 let of_row = place(equation, other)?;
-                Some(ConstrainedUnknown { equation: other, of_column, of_row, diagonal: place(other, other)? })
+                let (kind, diagonal) = (usize::from(is_rotation[other as usize]), place(other, other)?);
+                Some(ConstrainedUnknown { equation: other, kind, of_column, of_row, diagonal })
             };
             let ties: Vec<ConstrainedUnknown> = others.filter_map(tie).collect();
             for (k, a) in ties.iter().enumerate() {
@@ -126,7 +146,7 @@ impl Constraints {
         let Self { rows, additions, weights, values, .. } = self;
         values.clear();
         values.extend_from_slice(&system.values);
-        let largest = rows.iter().flat_map(|row| &row.ties).map(|tie| values[tie.diagonal].abs()).fold(0.0, f64::max);
+        let largest = stiffest(rows.iter().flat_map(|row| &row.ties), values);
         weights.iter_mut().zip(&*rows).for_each(|(weight, row)| *weight = row.weight(values, largest));
         for addition in additions {
             let product = system.values[addition.of_column] * system.values[addition.of_row];
@@ -154,18 +174,26 @@ impl Constraints {
 
 impl Multiplier {
     /// Weight from the stiffness of the constrained unknowns, independent of units:
-    /// `RELATIVE_WEIGHT`/w = sum B_k C_k/|K_kk|. Without any such stiffness the `largest` of the
-    /// scene is used.
-    fn weight(&self, values: &[f64], largest: f64) -> f64 {
+    /// `RELATIVE_WEIGHT`/w = sum B_k C_k/|K_kk|. Without any such stiffness the `largest` ones of
+    /// the scene are used.
+    fn weight(&self, values: &[f64], largest: ByKind) -> f64 {
         let square = |tie: &ConstrainedUnknown| (values[tie.of_column] * values[tie.of_row]).abs();
-        let stiffest = self.ties.iter().map(|tie| values[tie.diagonal].abs()).fold(0.0, f64::max);
-        let stiff = self.ties.iter().filter(|tie| values[tie.diagonal].abs() > NEGLIGIBLE * stiffest);
-        let softness: f64 = stiff.map(|tie| square(tie) / values[tie.diagonal].abs()).sum();
-        let squares: f64 = self.ties.iter().map(square).sum();
-        match (softness > 0.0, squares > 0.0) {
-            (true, _) => RELATIVE_WEIGHT / softness,
-            (false, true) => largest / squares,
-            (false, false) => 0.0,
+        let stiffness = |tie: &ConstrainedUnknown| values[tie.diagonal].abs();
+        let stiffest = stiffest(&self.ties, values);
+        let stiff = self.ties.iter().filter(|tie| stiffness(tie) > NEGLIGIBLE * stiffest[tie.kind]);
+        let softness: f64 = stiff.map(|tie| square(tie) / stiffness(tie)).sum();
+        if softness > 0.0 {
+            return RELATIVE_WEIGHT / softness;
         }
+        let ties = self.ties.iter().filter(|tie| largest[tie.kind] > 0.0);
+        let softness: f64 = ties.map(|tie| square(tie) / largest[tie.kind]).sum();
+        if softness > 0.0 { 1.0 / softness } else { 0.0 }
     }
+}
+
+/// The largest stiffnesses of constrained unknowns.
+fn stiffest<'a>(ties: impl IntoIterator<Item = &'a ConstrainedUnknown>, values: &[f64]) -> ByKind {
+    let mut largest = [0.0_f64; 2];
+    ties.into_iter().for_each(|tie| largest[tie.kind] = largest[tie.kind].max(values[tie.diagonal].abs()));
+    largest
 }

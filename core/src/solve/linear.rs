@@ -7,7 +7,8 @@ use super::general::GeneralSolver;
 use super::pivots::Pivots;
 use super::tangent::Tangent;
 use crate::interrupt;
-use crate::system::{ResidualBuffer, Slot, System};
+use crate::model::SlotKind;
+use crate::system::{ResidualBuffer, System};
 use crate::tensor::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +29,6 @@ pub struct LinearSolver {
     /// [`System::revision`] of the tangent factorised last; `None` if its values may have changed
     /// since without a new revision
     revision: Option<u64>,
-    pub(super) multipliers: Vec<Slot>,
     /// Multipliers with the tangent prepared for the block solver; `None` without multipliers
     constraints: Option<Constraints>,
     /// Separate factorisation that counts negative pivots if this solver's own does not
@@ -75,32 +75,28 @@ pub struct Factorisation {
 }
 
 impl LinearSolver {
-    /// Analyses the pattern of a system. `None` if memory is not available.
-    pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
-        let constraints = Constraints::new(&system.pattern, multipliers);
+    /// Analyses the pattern of a system with slots of these kinds. `None` if memory is not
+    /// available.
+    pub fn new(system: &System, kinds: &[SlotKind]) -> Option<Self> {
+        let constraints = Constraints::new(&system.pattern, kinds);
         let late = constraints.as_ref().map_or(&[][..], Constraints::node_blocks);
         let blocks = BlockSolver::new(&system.pattern, late);
-        Self::by(blocks, constraints, system, multipliers)
+        Self::by(blocks, constraints, system)
     }
 
     /// Solver for `system` that takes over the analysis of `other`, the solver of the system
     /// `others`, if their patterns are alike. `None` if memory is not available.
-    pub fn beside(other: &Self, others: &System, system: &System, multipliers: &[Slot]) -> Option<Self> {
+    pub fn beside(other: &Self, others: &System, system: &System, kinds: &[SlotKind]) -> Option<Self> {
         match other.blocks().filter(|_| system.pattern.is_like(&others.pattern)) {
             Some(blocks) => {
-                let constraints = Constraints::new(&system.pattern, multipliers);
-                Self::by(Some(blocks.of_like(&system.pattern)?), constraints, system, multipliers)
+                let constraints = Constraints::new(&system.pattern, kinds);
+                Self::by(Some(blocks.of_like(&system.pattern)?), constraints, system)
             }
-            None => Self::new(system, multipliers),
+            None => Self::new(system, kinds),
         }
     }
 
-    fn by(
-        blocks: Option<BlockSolver>,
-        constraints: Option<Constraints>,
-        system: &System,
-        multipliers: &[Slot],
-    ) -> Option<Self> {
+    fn by(blocks: Option<BlockSolver>, constraints: Option<Constraints>, system: &System) -> Option<Self> {
         let general = if blocks.is_none() { Some(Box::new(GeneralSolver::new(system)?)) } else { None };
         Some(Self {
             choice: MethodChoice {
@@ -114,7 +110,6 @@ impl LinearSolver {
             general,
             factored: false,
             revision: None,
-            multipliers: multipliers.to_vec(),
             constraints,
             pivots: None,
             unsymmetric_column: 0,

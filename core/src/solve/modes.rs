@@ -1,11 +1,12 @@
 //! Small motions x exp(s t) with (s^2 M + s C + K) x = 0 nearest to a shift, each verified.
 
+use super::constraints::Constraints;
 use super::krylov::{Operator, Spectrum, distinct_eigenvalues_until, largest_eigenvalues, roughly_largest_eigenvalues};
 use super::linear::LinearSolver;
 use super::pivots::is_symmetric;
 use super::softest::lost_part;
 use crate::interrupt;
-use crate::system::{DofMap, Symmetry, System};
+use crate::system::{Symmetry, System};
 use nalgebra::Complex;
 
 /// A rigid motion is linearly dependent on others if orthogonalisation reduces it to this part of
@@ -191,8 +192,7 @@ impl<'a> ModeSearch<'a> {
         } else {
             ProblemForm::General
         };
-        let equations = solver.multipliers.iter().flat_map(|&slot| system.pattern.dof_map.of(slot));
-        let multipliers = equations.filter(|&k| k != DofMap::HELD).map(|k| k as usize).collect();
+        let multipliers = solver.constraints().into_iter().flat_map(Constraints::equations).collect();
         let mut search = Self {
             system,
             solver,

@@ -4,7 +4,7 @@
 use super::block::BlockSolver;
 use super::constraints::Constraints;
 use crate::kernel::WIDTH;
-use crate::system::{Pattern, Slot, Symmetry, System, Tile};
+use crate::system::{Pattern, Symmetry, System, Tile};
 use std::cell::OnceCell;
 
 /// A factorisation L D L^T for counting negative pivots, beside a solver whose own factorisation
@@ -21,8 +21,7 @@ const SYMMETRY_TOLERANCE: f64 = 1e-9;
 impl Pivots {
     /// Factorisation for tangents of the pattern of a system, in the order of elimination of the
     /// block `solver`, if there is one. `None` if memory is not available.
-    pub fn beside(solver: Option<&BlockSolver>, multipliers: &[Slot], system: &System) -> Option<Self> {
-        let constraints = Constraints::new(&system.pattern, multipliers);
+    pub fn beside(solver: Option<&BlockSolver>, constraints: Option<Constraints>, system: &System) -> Option<Self> {
         let late = constraints.as_ref().map_or(&[][..], Constraints::node_blocks);
         let blocks = match solver {
             Some(blocks) => blocks.symmetric_beside(&system.pattern)?,

@@ -94,7 +94,7 @@ impl LinearSolver {
             return None;
         }
         if self.pivots.is_none() {
-            self.pivots = Pivots::beside(self.blocks(), &self.multipliers, system);
+            self.pivots = Pivots::beside(self.blocks(), self.constraints().cloned(), system);
         }
         self.pivots.as_mut()?.negative(system)
     }

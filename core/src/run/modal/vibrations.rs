@@ -58,7 +58,7 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
         return Ok(Vibrations::Unknown);
     }
     let mut assembly = Assembly::about(stage.state, &context, dof_map, stage.model);
-    let Some(mut solver) = LinearSolver::new(&assembly.system, &stage.model.multipliers) else {
+    let Some(mut solver) = LinearSolver::new(&assembly.system, &stage.model.kinds) else {
         return Ok(Vibrations::Unknown);
     };
     let matrices = matrices(&mut assembly, stage.state, stage.model);
