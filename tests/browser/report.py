@@ -361,12 +361,20 @@ if (!frames.checked) frames.click();
 """
 
 
+def check_warnings(browser, record):
+    expected = [warning["message"] for warning in json.loads(record.read_text())["warnings"]]
+    told = browser.run("return [...document.querySelectorAll('#warnings li')].map((line) => line.checkVisibility() ? line.textContent : '')")
+    check(len(told) == len(expected), f"{len(told)} warnings are shown of {len(expected)}")
+    check(all(text.endswith(message) for text, message in zip(told, expected)), "warnings are told as the run told them")
+
+
 def check_report(browser, report, history, pictures, titles):
     names, rows = read_history(history)
     browser.screen(1280, 800, 1, False)
     browser.open(report.resolve().as_uri())
     until(lambda: browser.run("return !!window.report"), 120, "the report starts")
     browser.settle()
+    check_warnings(browser, history.with_name("run.json"))
     if rows:
         check_drawing(browser)
         check_playing(browser)
