@@ -115,6 +115,8 @@ warning_kinds! {
     HistoryJump: "history_jump", Deck;
     /// The history of a motion has kinks, at which velocities jump.
     HistoryKinks: "history_kinks", Deck;
+    /// A load changes between the ends of fixed time steps.
+    MissedLoad: "missed_load", Time;
     /// An element turns far from node to node.
     CoarseMesh: "coarse_mesh", Mesh;
     /// The estimated error of a computed section is large, or larger than `mesh` asks for.

@@ -66,6 +66,9 @@ const SMOOTH: &str = "`smooth = true` makes velocity and acceleration continuous
 const SAMPLED: &str = "an `expr`, or a table with more points, has no kinks (`smooth = true` has none either, but its \
                        velocity is zero at each of its times)";
 
+const BETWEEN_STEPS: &str = "a shorter `step`, of which the times of the history are multiples, or `adaptive = true`, \
+                             whose steps end at these times";
+
 struct Teller<'a> {
     deck: &'a Deck,
     plan: &'a Plan,
@@ -125,6 +128,16 @@ impl Teller<'_> {
                 let help = "let the history start with zero slope, or give the velocity by `[[initial]]` (first \
                             dynamic stage only)";
                 Diagnostic::warning(WarningKind::VelocityJump, message, table.span.clone()).help(help)
+            }
+            JumpKind::BetweenSteps { part } => {
+                let percent = (100.0 * part).round();
+                let message = format!(
+                    "the time steps of stage {number} miss {percent} % of the history{name} of this {what}: it changes \
+                     between them{more}"
+                );
+                Diagnostic::warning(WarningKind::MissedLoad, message, table.span.clone())
+                    .context(begins_there, "this stage")
+                    .help(BETWEEN_STEPS)
             }
             JumpKind::Kink { time } => {
                 let message = format!(

@@ -35,7 +35,8 @@ pub struct Guide {
 pub struct Slider {
     /// The displacement of the node that slides
     pub u: Slot,
-    /// Its initial place
+    /// The initial place on the line from which its displacement counts: a node that begins beside the
+    /// line keeps that distance, so that nothing jumps
     pub place: Vec3,
     /// The number of the guide
     pub guide: usize,
@@ -84,8 +85,8 @@ impl Guide {
         self.knots[self.nodes.len() - 1]
     }
 
-    /// The arc length at which the line is nearest to a place at the start, and the distance there.
-    pub fn nearest(&self, place: Vec3) -> (f64, f64) {
+    /// The arc length at which the line is nearest to a place at the start, and its place there.
+    pub fn nearest(&self, place: Vec3) -> (f64, Vec3) {
         let initial = |s: f64| {
             let element = element_at(&self.knots, s);
             let nodes: Vec<Vec3> = stencil(element, self.nodes.len()).map(|k| self.nodes[k].place).collect();
@@ -98,7 +99,7 @@ impl Guide {
             let line = initial(s);
             s = (s + (place - line.place).dot(line.slope) / line.slope.dot(line.slope)).clamp(0.0, self.length());
         }
-        (s, distance(s))
+        (s, initial(s).place)
     }
 }
 

@@ -16,6 +16,7 @@ mod snapshot;
 
 mod hint;
 mod rehearsal;
+mod sampling;
 
 mod handover;
 mod naming;

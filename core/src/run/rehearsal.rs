@@ -4,7 +4,8 @@
 //! Loads, motions and motors go through their stages as in a run, on a state in which nothing but
 //! prescribed motions moves.
 
-use super::plan::{InitialMotion, Plan, Stage};
+use super::plan::{InitialMotion, Plan, Stage, StageWork, TimeStepping};
+use super::sampling::missed_part;
 use crate::model::{Model, Motion, MotionKind, NOTICED, Schedule, StageError, StageKind, Timeline};
 use crate::system::{DofMap, Slot, State};
 use crate::tensor::Vec3;
@@ -72,6 +73,11 @@ pub enum JumpKind {
     Kink {
         /// The run's clock
         time: f64,
+    },
+    /// Up and down between the ends of fixed time steps, which see nothing of it
+    BetweenSteps {
+        /// The share of the impulse that they miss
+        part: f64,
     },
     /// It has no finite value, velocity or acceleration where the stage begins.
     NotFinite,
@@ -193,8 +199,9 @@ impl<'p> Rehearser<'p> {
         let given = begins.then_some(&given[..]);
         self.look_at_velocities(number, given);
         self.look_at_motors(number, begins);
-        if let Some(end) = stage.work.end() {
-            self.look_at_kinks(number, end);
+        if let StageWork::Dynamic(steps) = &stage.work {
+            self.look_at_kinks(number, steps.end);
+            self.look_between_steps(number, steps);
         }
     }
 
@@ -291,6 +298,20 @@ impl<'p> Rehearser<'p> {
         self.model.each_motor(&self.state, &mut |motor| {
             look(self.schedule.load(self.model, motor.amplitude).next_kink(clock), Driven::Motor(motor.slot));
         });
+    }
+
+    /// Loads that change between the ends of fixed steps.
+    fn look_between_steps(&mut self, number: usize, steps: &TimeStepping) {
+        if steps.adaptive.is_some() || steps.end <= self.state.time {
+            return;
+        }
+        for (k, timeline) in self.schedule.loads(self.model).enumerate() {
+            let value = |time| timeline.at(time, 1.0)[0];
+            let missed =
+                missed_part(value, |time| timeline.next_corner(time), [self.state.time, steps.end], steps.step);
+            let how = missed.map(|part| JumpKind::BetweenSteps { part });
+            self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Amplitude(k), how }));
+        }
     }
 
     fn end(&mut self, number: usize, stage: &Stage) {

@@ -123,7 +123,8 @@ impl Composer<'_> {
             self.diagnostics.push(Diagnostic::error(message, table.span.clone()));
             return;
         }
-        let (start, distance) = guide.nearest(placed.place);
+        let (start, place) = guide.nearest(placed.place);
+        let distance = (placed.place - place).norm();
         let spacing = guide.length() / guide.elements() as f64;
         if distance > OFF_THE_LINE * spacing {
             let message = format!("node `{name}` is {distance:.3e} off the line of beam `{}`", table.on.value);
@@ -137,7 +138,7 @@ impl Composer<'_> {
         let idle = [1, 2].map(|k| Direction { slot: slide, axis: Vec3::UNIT[k] });
         self.out.idle_multipliers.push(Support { directions: idle.to_vec(), stages: stage_set(None) });
         let guide = out.guides.len();
-        out.sliders.push(Slider { u: placed.node.u, place: placed.place, guide, start, slide, force });
+        out.sliders.push(Slider { u: placed.node.u, place, guide, start, slide, force });
         if let Some(drive) = &table.drive {
             self.drive_slider(table, drive, slide);
         }

@@ -103,7 +103,9 @@ impl Sampler {
     }
 
     /// Compares the columns of a scene with those of a table that has rows at these instants.
-    pub fn of_table(deck: &Deck, scene: &Scene, outputs: Vec<usize>, instants: Vec<StageClock>) -> Self {
+    pub fn of_table(deck: &Deck, scene: &Scene, outputs: Vec<usize>, mut instants: Vec<StageClock>) -> Self {
+        // The last row is compared in any case.
+        instants.pop();
         Self {
             outputs,
             rows: ComparedRows::At(instants),
@@ -310,7 +312,7 @@ fn ambiguous(scene: &Scene) -> Vec<Ambiguous> {
 
 /// The instants that all runs of a deck have: levels of static stages, and multiples of the
 /// coarsest step of dynamic ones, preceded by halvings of that step. Paths have only their ends in
-/// common.
+/// common. The last row of a run is compared beside these.
 fn instants(deck: &Deck, coarsest: Pace, halvings: i32) -> Vec<StageClock> {
     let mut all = Vec::new();
     let mut start = 0.0;
@@ -338,6 +340,14 @@ fn instants(deck: &Deck, coarsest: Pace, halvings: i32) -> Vec<StageClock> {
             StageBody::Path { .. } | StageBody::Modal { .. } | StageBody::Buckling { .. } => {}
         }
     }
+    all.dedup_by(|next, last| next.stage == last.stage && (next.clock - last.clock).abs() <= SAME * last.clock);
+    let moving = deck.stages.iter().rposition(|stage| stage.body.kind().advances_state()).map(|k| &deck.stages[k].body);
+    let end = match moving {
+        Some(StageBody::Dynamic { end, .. }) => Some(*end),
+        Some(StageBody::Static { .. }) => Some(1.0),
+        Some(StageBody::Path { .. } | StageBody::Modal { .. } | StageBody::Buckling { .. }) | None => None,
+    };
+    all.pop_if(|last| end.is_some_and(|end| (last.clock - end).abs() <= SAME * end));
     all
 }
 
