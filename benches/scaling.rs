@@ -94,7 +94,7 @@ fn parts(elements: usize, dynamic: bool, interpolation: &str) {
     assembly.evaluate(&state, weights, None);
     let increments = vec![Vec3([1e-9; 3]); state.q.len()];
     let extrapolate = quickest(|| assembly.extrapolate(&state, &increments));
-    let Some(mut solver) = LinearSolver::new(&assembly.system, &[]) else { return };
+    let Some(mut solver) = LinearSolver::new(&assembly.system, &[], 1.0) else { return };
     let system = &assembly.system;
     let factorise = quickest(|| assert!(solver.factorise(system)));
     let mut x = vec![1.0; system.pattern.dof_map.count()];

@@ -48,7 +48,7 @@ fn count(assembly: &mut Assembly, model: &Model, state: &State) -> (Option<usize
     assembly.evaluate(state, Weights::STIFFNESS, None);
     let eigenvalues = eigenvalues_between_constraints(&assembly.system, model);
     let nearest = eigenvalues.iter().fold(f64::INFINITY, |m, v| m.min(v.abs()));
-    let mut solver = LinearSolver::new(&assembly.system, &model.kinds).unwrap();
+    let mut solver = LinearSolver::new(&assembly.system, &model.kinds, model.length).unwrap();
     let told = solver.negative_pivots(&mut Tangent::that_may_go(assembly, state, Weights::STIFFNESS));
     (told, eigenvalues.iter().filter(|&&value| value < 0.0).count(), nearest)
 }

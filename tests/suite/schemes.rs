@@ -198,7 +198,7 @@ fn alternating_to(text: &str, scheme: Scheme, h: f64, end: f64, tip: &str) -> [f
     let mut schedule = Schedule::new(&model);
     let dof_map = schedule.begin_stage(&model, 0, StageKind::Dynamic, &state).unwrap();
     let mut assembly = Assembly::new(&scene.plan.stages[0].context(0), dof_map, &model);
-    let solver = LinearSolver::new(&assembly.system, &model.kinds).unwrap();
+    let solver = LinearSolver::new(&assembly.system, &model.kinds, model.length).unwrap();
     let total = scheme.rotations == Rotations::Totals;
     let increments = (!total).then(|| Increments::new(&model, StageKind::Dynamic, &assembly.system.pattern.dof_map));
     let mut newton = Newton::new(Convergence { tolerance: 1e-12, negligible: 0.0 }, 25, solver, &assembly.system);

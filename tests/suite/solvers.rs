@@ -300,7 +300,7 @@ fn tangents_are_used_up_where_that_loses_no_digits() {
         let mut schedule = Schedule::new(&model);
         let Ok(dof_map) = schedule.begin_stage(&model, 0, stage.kind, &rest) else { panic!("the stage begins") };
         let mut assembly = Assembly::new(&stage, dof_map, &model);
-        let mut solver = LinearSolver::new(&assembly.system, &[]).unwrap();
+        let mut solver = LinearSolver::new(&assembly.system, &[], 1.0).unwrap();
         let wanted: Vec<f64> = (0..assembly.system.pattern.dof_map.count()).map(|k| (k as f64).sin()).collect();
         // Pulled apart it is definite; of pushed together there are negative pivots.
         for (sign, goes) in [
@@ -476,7 +476,7 @@ fn a_lost_pivot_is_no_lost_solution() {
         }
     }
     let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
-    let mut solver = LinearSolver::new(&system, &[]).unwrap();
+    let mut solver = LinearSolver::new(&system, &[], 1.0).unwrap();
     assert_eq!(solver.name(), "block LDL^T");
     let mut x = wanted.clone();
     // Positive pivots of the tangent before vouch for nothing.
@@ -497,7 +497,7 @@ fn nets_are_left_to_faer() {
     let mut random = Random::new(7);
     let system = system(&lattice(120), Symmetry::Whole, 30.0, &mut random);
     assert!(BlockSolver::new(&system.pattern, &[]).is_none());
-    assert_eq!(LinearSolver::new(&system, &[]).unwrap().name(), "sparse LU");
+    assert_eq!(LinearSolver::new(&system, &[], 1.0).unwrap().name(), "sparse LU");
 }
 
 /// Of several effects the least symmetric one counts, and of one whether it couples nodes at all.
@@ -643,8 +643,8 @@ fn space_takes_over_the_order_of_a_plane() {
         assert_eq!(plane.system.pattern.symmetry, Symmetry::Whole);
         assert_eq!(space.system.pattern.symmetry, symmetry);
         assert!(space.system.pattern.is_like(&plane.system.pattern));
-        let own = LinearSolver::new(&plane.system, &[]).unwrap();
-        let mut solver = LinearSolver::beside(&own, &plane.system, &space.system, &[]).unwrap();
+        let own = LinearSolver::new(&plane.system, &[], 1.0).unwrap();
+        let mut solver = LinearSolver::beside(&own, &plane.system, &space.system, &[], 1.0).unwrap();
         space.evaluate(&model.rest(), Weights { stiffness: 1.0, damping: 2.0, mass: 4.0 }, None);
         if symmetry == Symmetry::Whole {
             let (rest, weights) = (model.rest(), Weights { stiffness: 1.0, damping: 2.0, mass: 4.0 });
@@ -663,7 +663,7 @@ fn space_takes_over_the_order_of_a_plane() {
         // Where others meet nothing is taken over.
         let (model, _, _, mut other) = planar(7, kind);
         assert!(!space.system.pattern.is_like(&other.system.pattern));
-        let mut solver = LinearSolver::beside(&own, &plane.system, &other.system, &[]).unwrap();
+        let mut solver = LinearSolver::beside(&own, &plane.system, &other.system, &[], 1.0).unwrap();
         other.evaluate(&model.rest(), Weights { stiffness: 1.0, damping: 2.0, mass: 4.0 }, None);
         solves(&mut solver, &other.system);
     }

@@ -19,7 +19,7 @@ impl InSpace {
         let dof_map = stage.schedule.dof_map(stage.model, None).map_err(|error| stage.describe(error))?;
         let assembly = Assembly::about(stage.state, &context, dof_map, stage.model);
         let (solver, system) = (&stage.newton.solver, &stage.assembly.system);
-        match LinearSolver::beside(solver, system, &assembly.system, &stage.model.kinds) {
+        match LinearSolver::beside(solver, system, &assembly.system, &stage.model.kinds, stage.model.length) {
             Some(solver) => Ok(Self { assembly, solver }),
             None => Err(stage.moment().limit("not enough memory for the out-of-plane stability check")),
         }

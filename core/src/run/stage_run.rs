@@ -96,7 +96,7 @@ pub(super) struct StageRun<'r> {
 
 /// Newton's iteration on the system of a stage.
 pub(super) fn newton_for(stage: &Stage, assembly: &Assembly, model: &Model, at: Moment) -> Result<Newton, Failure> {
-    let Some(solver) = LinearSolver::new(&assembly.system, &model.kinds) else {
+    let Some(solver) = LinearSolver::new(&assembly.system, &model.kinds, model.length) else {
         return Err(at.limit("not enough memory for the factorisation of the tangent"));
     };
     // Forces of bodies that fly freely fall from step to step, until products with them underflow.

@@ -21,13 +21,10 @@ use std::collections::BTreeMap;
 /// that these remain stiff when they lose their own stiffness.
 const RELATIVE_WEIGHT: f64 = 8.0;
 
-/// A stiffness below this part of the largest one of a constraint against the same kind of motion is
-/// round-off, such as that of the sliding along a line that is nearly straight: a weight from it
-/// would leave a pivot of round-off.
+/// A stiffness below this part of the largest one of a constraint is round-off, such as that of the
+/// sliding along a line that is nearly straight: a weight from it would leave a pivot of round-off.
+/// Displacements are taken in lengths of the scene, rotations in radians.
 const NEGLIGIBLE: f64 = 1e-12;
-
-/// Stiffnesses against displacements and against rotations, which have different units.
-type ByKind = [f64; 2];
 
 /// The multipliers of a pattern, and the values of the last prepared tangent.
 #[derive(Clone)]
@@ -53,8 +50,8 @@ struct Multiplier {
 #[derive(Clone)]
 struct ConstrainedUnknown {
     equation: u32,
-    /// Index in [`ByKind`]
-    kind: usize,
+    /// Square of the unit in which it compares with others
+    scale2: f64,
     of_column: usize,
     of_row: usize,
     diagonal: usize,
@@ -71,23 +68,22 @@ struct WeightedProduct {
 }
 
 impl Constraints {
-    /// Constraints of the slots that are multipliers, among slots of these kinds; `None` if they
-    /// have no equation.
-    pub fn new(pattern: &Pattern, kinds: &[SlotKind]) -> Option<Self> {
-        let slots_of = |is_one: fn(SlotKind) -> bool| {
-            (0..).zip(kinds).filter(move |(_, kind)| is_one(**kind)).map(|(slot, _)| slot as Slot)
-        };
+    /// Constraints of the slots that are multipliers, among slots of these kinds, in a scene of this
+    /// length; `None` if they have no equation.
+    pub fn new(pattern: &Pattern, kinds: &[SlotKind], length: f64) -> Option<Self> {
+        let slots = || (0..).zip(kinds.iter().copied());
         let equations_of = |slot: Slot| pattern.dof_map.of(slot).into_iter().filter(|&at| at != DofMap::HELD);
-        let multipliers: Vec<Slot> = slots_of(SlotKind::is_multiplier).collect();
+        let multipliers: Vec<Slot> = slots().filter(|(_, kind)| kind.is_multiplier()).map(|(slot, _)| slot).collect();
         let equations: Vec<u32> = multipliers.iter().flat_map(|&slot| equations_of(slot)).collect();
         if equations.is_empty() {
             return None;
         }
         let mut is_multiplier = vec![false; pattern.dof_map.count()];
         equations.iter().for_each(|&equation| is_multiplier[equation as usize] = true);
-        let mut is_rotation = vec![false; pattern.dof_map.count()];
-        let rotations = slots_of(|kind| kind == SlotKind::Rotation).flat_map(equations_of);
-        rotations.for_each(|equation| is_rotation[equation as usize] = true);
+        let mut scale2 = vec![1.0; pattern.dof_map.count()];
+        for (slot, kind) in slots() {
+            equations_of(slot).for_each(|equation| scale2[equation as usize] = kind.scale(length).powi(2));
+        }
         let mut columns: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
         let mut place = |row: u32, column: u32| {
             let entries = || pattern.entries(column).map(|entry| (entry.row, entry.place)).collect();
@@ -101,8 +97,8 @@ impl Constraints {
             let tie = |other: u32| {
                 let of_column = place(other, equation)?;
                 let of_row = place(equation, other)?;
-                let (kind, diagonal) = (usize::from(is_rotation[other as usize]), place(other, other)?);
-                Some(ConstrainedUnknown { equation: other, kind, of_column, of_row, diagonal })
+                let (scale2, diagonal) = (scale2[other as usize], place(other, other)?);
+                Some(ConstrainedUnknown { equation: other, scale2, of_column, of_row, diagonal })
             };
             let ties: Vec<ConstrainedUnknown> = others.filter_map(tie).collect();
             for (k, a) in ties.iter().enumerate() {
@@ -146,7 +142,7 @@ impl Constraints {
         let Self { rows, additions, weights, values, .. } = self;
         values.clear();
         values.extend_from_slice(&system.values);
-        let largest = stiffest(rows.iter().flat_map(|row| &row.ties), values);
+        let largest = rows.iter().flat_map(|row| &row.ties).map(|tie| tie.stiffness(values)).fold(0.0, f64::max);
         weights.iter_mut().zip(&*rows).for_each(|(weight, row)| *weight = row.weight(values, largest));
         for addition in additions {
             let product = system.values[addition.of_column] * system.values[addition.of_row];
@@ -172,28 +168,35 @@ impl Constraints {
     }
 }
 
-impl Multiplier {
-    /// Weight from the stiffness of the constrained unknowns, independent of units:
-    /// `RELATIVE_WEIGHT`/w = sum B_k C_k/|K_kk|. Without any such stiffness the `largest` ones of
-    /// the scene are used.
-    fn weight(&self, values: &[f64], largest: ByKind) -> f64 {
-        let square = |tie: &ConstrainedUnknown| (values[tie.of_column] * values[tie.of_row]).abs();
-        let stiffness = |tie: &ConstrainedUnknown| values[tie.diagonal].abs();
-        let stiffest = stiffest(&self.ties, values);
-        let stiff = self.ties.iter().filter(|tie| stiffness(tie) > NEGLIGIBLE * stiffest[tie.kind]);
-        let softness: f64 = stiff.map(|tie| square(tie) / stiffness(tie)).sum();
-        if softness > 0.0 {
-            return RELATIVE_WEIGHT / softness;
-        }
-        let ties = self.ties.iter().filter(|tie| largest[tie.kind] > 0.0);
-        let softness: f64 = ties.map(|tie| square(tie) / largest[tie.kind]).sum();
-        if softness > 0.0 { 1.0 / softness } else { 0.0 }
+impl ConstrainedUnknown {
+    /// Stiffness of the unknown, in comparable units.
+    fn stiffness(&self, values: &[f64]) -> f64 {
+        values[self.diagonal].abs() * self.scale2
+    }
+
+    /// B_k C_k
+    fn square(&self, values: &[f64]) -> f64 {
+        (values[self.of_column] * values[self.of_row]).abs()
     }
 }
 
-/// The largest stiffnesses of constrained unknowns.
-fn stiffest<'a>(ties: impl IntoIterator<Item = &'a ConstrainedUnknown>, values: &[f64]) -> ByKind {
-    let mut largest = [0.0_f64; 2];
-    ties.into_iter().for_each(|tie| largest[tie.kind] = largest[tie.kind].max(values[tie.diagonal].abs()));
-    largest
+impl Multiplier {
+    /// Weight from the stiffness of the constrained unknowns, independent of units:
+    /// `RELATIVE_WEIGHT`/w = sum B_k C_k/|K_kk|. Without any such stiffness the `largest` one of the
+    /// scene is used.
+    fn weight(&self, values: &[f64], largest: f64) -> f64 {
+        let part = |tie: &ConstrainedUnknown| tie.square(values) * tie.scale2;
+        let most = self.ties.iter().map(part).fold(0.0, f64::max);
+        // Coefficients that are round-off do not make an unknown part of the constraint.
+        let constrained = self.ties.iter().filter(|tie| part(tie) > NEGLIGIBLE * NEGLIGIBLE * most);
+        let stiffest = constrained.map(|tie| tie.stiffness(values)).fold(0.0, f64::max);
+        let stiff = self.ties.iter().filter(|tie| tie.stiffness(values) > NEGLIGIBLE * stiffest);
+        let softness: f64 = stiff.map(|tie| tie.square(values) / values[tie.diagonal].abs()).sum();
+        let squares: f64 = self.ties.iter().map(part).sum();
+        match (softness > 0.0, squares > 0.0) {
+            (true, _) => RELATIVE_WEIGHT / softness,
+            (false, true) => largest / squares,
+            (false, false) => 0.0,
+        }
+    }
 }

@@ -75,10 +75,10 @@ pub struct Factorisation {
 }
 
 impl LinearSolver {
-    /// Analyses the pattern of a system with slots of these kinds. `None` if memory is not
-    /// available.
-    pub fn new(system: &System, kinds: &[SlotKind]) -> Option<Self> {
-        let constraints = Constraints::new(&system.pattern, kinds);
+    /// Analyses the pattern of a system with slots of these kinds, in a scene of this length. `None`
+    /// if memory is not available.
+    pub fn new(system: &System, kinds: &[SlotKind], length: f64) -> Option<Self> {
+        let constraints = Constraints::new(&system.pattern, kinds, length);
         let late = constraints.as_ref().map_or(&[][..], Constraints::node_blocks);
         let blocks = BlockSolver::new(&system.pattern, late);
         Self::by(blocks, constraints, system)
@@ -86,13 +86,13 @@ impl LinearSolver {
 
     /// Solver for `system` that takes over the analysis of `other`, the solver of the system
     /// `others`, if their patterns are alike. `None` if memory is not available.
-    pub fn beside(other: &Self, others: &System, system: &System, kinds: &[SlotKind]) -> Option<Self> {
+    pub fn beside(other: &Self, others: &System, system: &System, kinds: &[SlotKind], length: f64) -> Option<Self> {
         match other.blocks().filter(|_| system.pattern.is_like(&others.pattern)) {
             Some(blocks) => {
-                let constraints = Constraints::new(&system.pattern, kinds);
+                let constraints = Constraints::new(&system.pattern, kinds, length);
                 Self::by(Some(blocks.of_like(&system.pattern)?), constraints, system)
             }
-            None => Self::new(system, kinds),
+            None => Self::new(system, kinds, length),
         }
     }
 

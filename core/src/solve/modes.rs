@@ -372,10 +372,8 @@ impl<'a> ModeSearch<'a> {
                 return None;
             }
             let Some(motion) = self.motion(&spectrum, number) else { continue };
-            let s = motion.exponent;
-            // Flutter: if s is an exponent, so is -s* (complex conjugate), of equal frequency.
-            let twin = self.form == ProblemForm::Undamped && s.re > MIN_FLUTTER_RATIO * s.norm() && s.im > 0.0;
-            let twin = twin.then(|| SmallMotion { exponent: -s.conj(), ..motion.clone() });
+            let twin = self.exponents(spectrum.values[number]).1;
+            let twin = twin.map(|exponent| SmallMotion { exponent, ..motion.clone() });
             motions.push(motion);
             motions.extend(twin);
         }
@@ -440,7 +438,32 @@ impl<'a> ModeSearch<'a> {
     /// the other, or if verification fails.
     fn motion(&self, spectrum: &Spectrum, number: usize) -> Option<SmallMotion> {
         let theta = spectrum.values[number];
-        if self.is_told(theta) { self.check(spectrum, number, self.form.exponent(self.shift, theta)) } else { None }
+        let checked = || self.check(spectrum, number, self.form.exponent(self.shift, theta));
+        let motion = if self.is_told(theta) { checked() } else { None };
+        motion.map(|motion| SmallMotion { exponent: self.exponents(theta).0, ..motion })
+    }
+
+    /// The exponent of an eigenvalue that is told, and of the motion of its complex conjugate, which
+    /// is not. Round-off makes conjugate pairs of double real eigenvalues: these have one exponent
+    /// twice, which is real or imaginary.
+    fn exponents(&self, theta: Complex<f64>) -> (Complex<f64>, Option<Complex<f64>>) {
+        let s = self.form.exponent(self.shift, theta);
+        let is_negligible = |part: f64| part.abs() <= MIN_FLUTTER_RATIO * s.norm();
+        match self.form {
+            ProblemForm::Symmetric => (s, None),
+            ProblemForm::Undamped | ProblemForm::Gyroscopic | ProblemForm::General if theta.im == 0.0 => (s, None),
+            ProblemForm::Undamped | ProblemForm::Gyroscopic | ProblemForm::General if is_negligible(s.im) => {
+                let double = Complex::from(s.re);
+                (double, Some(double))
+            }
+            ProblemForm::Undamped if is_negligible(s.re) => {
+                let double = Complex::new(0.0, s.im);
+                (double, Some(double))
+            }
+            // Flutter: if s is an exponent, so is -s* (complex conjugate), of equal frequency.
+            ProblemForm::Undamped => (s, Some(-s.conj())),
+            ProblemForm::Gyroscopic | ProblemForm::General => (s, None),
+        }
     }
 
     /// True for one eigenvalue of the operator of each conjugate pair.

@@ -58,7 +58,7 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
         return Ok(Vibrations::Unknown);
     }
     let mut assembly = Assembly::about(stage.state, &context, dof_map, stage.model);
-    let Some(mut solver) = LinearSolver::new(&assembly.system, &stage.model.kinds) else {
+    let Some(mut solver) = LinearSolver::new(&assembly.system, &stage.model.kinds, stage.model.length) else {
         return Ok(Vibrations::Unknown);
     };
     let matrices = matrices(&mut assembly, stage.state, stage.model);
@@ -74,7 +74,10 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
         return Ok(Vibrations::Diverging);
     }
     match solver.signature_of_last(&assembly.system) {
-        Some(Signature::Negative(count)) => return Ok(Vibrations::Counted(count)),
+        Some(Signature::Negative(count)) if pivots_tell(count, context.rotating) => {
+            return Ok(Vibrations::Counted(count));
+        }
+        Some(Signature::Negative(_)) => {}
         Some(Signature::Parity { is_odd: true }) => return Ok(Vibrations::Diverging),
         Some(Signature::Parity { is_odd: false }) | None => {}
     }
@@ -90,6 +93,12 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
     let found = timed(&mut counters.work.solve_seconds, || find_growth(&mut search, MODES, ENOUGH_GROWTH));
     counters.work.factorisations += search.factorisations;
     Ok(found.map_or(Vibrations::Unknown, |growth| judge(&growth)))
+}
+
+/// True if the number of negative pivots tells stability: in a rotating frame Coriolis forces may hold
+/// an even number of unstable directions, and never an odd one (Thomson and Tait 1879).
+pub(in crate::run) fn pivots_tell(negative: usize, is_rotating: bool) -> bool {
+    !is_rotating || negative == 0 || negative % 2 == 1
 }
 
 /// The verdict of the motions that grow.
