@@ -401,3 +401,44 @@ fn modes_of_what_turns_are_told_to_be_those_at_rest() {
         |spin: f64| attempt(&deck(spin)).counters.findings.warnings.iter().any(|w| w.kind == WarningKind::OutOfBalance);
     assert!(warned(30.0) && !warned(1e-3));
 }
+
+/// A frame goes on from the spin and the axis of the stage before: on the way each state is that of a frame of its own.
+#[test]
+fn a_frame_goes_from_the_motion_of_the_stage_before_to_its_own() {
+    let stage = |steps: usize, spin: f64, about: f64| {
+        format!(
+            "[[stage]]\nkind = \"static\"\nsteps = {steps}\nframe = {{ spin = [0, 0, {spin:?}], about = [{about:?}, 0, 0] }}\n"
+        )
+    };
+    let output = "[output]\ncolumns = [\"u\"]\nnodes = [\"tip\"]\n";
+    let run = |stages: &str| simulate(&format!("{ARM}{CLAMP}{stages}{output}"));
+    let alone = |spin: f64, about: f64| run(&stage(1, spin, about)).end("tip.ux");
+    let mut random = Random::new(88);
+    for _ in 0..6 {
+        let [first, second] = [0, 1].map(|_| [random.range(-8.0, 8.0), random.range(-1.0, 0.0)]);
+        let both = stage(2, first[0], first[1]) + &stage(4, second[0], second[1]);
+        let ux = run(&(both + &stage(1, second[0], second[1]))).column("tip.ux");
+        let expected: Vec<f64> = [0.25, 0.5, 0.75, 1.0, 1.0]
+            .iter()
+            .map(|part| alone(first[0] + (second[0] - first[0]) * part, first[1] + (second[1] - first[1]) * part))
+            .collect();
+        for (found, expected) in ux[3..].iter().zip(&expected) {
+            assert!((found - expected).abs() < 1e-12, "{first:?} {second:?}: {ux:?} {expected:?}");
+        }
+        assert_eq!(ux.len(), 8);
+    }
+}
+
+/// Forces of round-off are no imbalance.
+#[test]
+fn round_off_is_not_out_of_balance() {
+    let deck = "[point]\na = [0, 0, 0]\nb = [0.1, 0.2, 0.3]\n[[body]]\nat = \"a\"\nmass = 1\ninertia = [1, 1, 1]\n\
+                [[body]]\nat = \"b\"\nmass = 1\ninertia = [1, 1, 1]\n[[spring]]\nat = \"a\"\nstiffness = [1, 1, 1, 1, 1, 1]\n\
+                [[spring]]\nat = \"b\"\nstiffness = [1, 1, 1, 1, 1, 1]\n[[spring]]\nbetween = [\"a\", \"b\"]\nstiffness = 1\n\
+                length = 0.3741657386773941\n[[stage]]\nkind = \"static\"\nsteps = 1\n[[stage]]\nkind = \"modal\"\nmodes = 2\n";
+    let warned = simulate(deck).counters.findings.warnings;
+    assert!(warned.is_empty(), "{warned:?}");
+    let pulled = deck.replace("0.3741657386773941", "0.36").replace("[[stage]]\nkind = \"static\"\nsteps = 1\n", "");
+    let warned = simulate(&pulled).counters.findings.warnings;
+    assert!(warned.iter().any(|warning| warning.kind == WarningKind::OutOfBalance), "{warned:?}");
+}

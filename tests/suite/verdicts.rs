@@ -204,3 +204,21 @@ fn random_columns_end_as_hermite_elements_say() {
     }
     assert!(judged > 40 && unstable > 10 && judged - unstable > 10, "{judged} judged, {unstable} unstable");
 }
+
+/// A rotor on springs (Jeffcott): above its critical speed, 10, Coriolis forces hold it; on unequal springs it grows between the
+/// two critical speeds, 8 and 10, where one pivot is negative.
+#[test]
+fn rotors_are_held_above_their_critical_speed() {
+    let rotor = |soft: f64, spin: f64| {
+        format!(
+            "[point]\np = [0, 0, 0]\n[[body]]\nat = \"p\"\nmass = 1\ninertia = [1, 1, 1.5]\n[[spring]]\nat = \"p\"\n\
+             stiffness = [{soft}, 100, 100, 1e4, 1e4, 1e4]\n[[stage]]\nkind = \"static\"\nsteps = 4\n\
+             frame = {{ spin = [0, 0, {spin}], about = \"p\" }}\n"
+        )
+    };
+    assert_eq!(verdict(&rotor(100.0, 9.0)), StabilityVerdict::Stable);
+    assert_eq!(verdict(&rotor(100.0, 15.0)), StabilityVerdict::Stable);
+    assert_eq!(verdict(&rotor(64.0, 7.0)), StabilityVerdict::Stable);
+    assert_eq!(verdict(&rotor(64.0, 9.0)), StabilityVerdict::Unstable);
+    assert_eq!(verdict(&rotor(64.0, 15.0)), StabilityVerdict::Stable);
+}

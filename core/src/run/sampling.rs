@@ -23,7 +23,7 @@ pub fn missed_part(
     };
     let (mut whole, mut start) = (0.0, from);
     for end in corners().chain([to]) {
-        whole += integral(&change, start, end).abs();
+        whole += integral(change, start, end).abs();
         start = end;
     }
     let (mut error, mut largest) = (0.0_f64, 0.0_f64);
@@ -35,13 +35,13 @@ pub fn missed_part(
         if (corner - begin).min(end - corner) < ON_GRID * step {
             continue;
         }
-        let mut exact = integral(&change, begin, corner);
+        let mut exact = integral(change, begin, corner);
         let mut start = corner;
         while let Some(next) = corners.next_if(|&next| next < end - ON_GRID * step) {
-            exact += integral(&change, start, next);
+            exact += integral(change, start, next);
             start = next;
         }
-        exact += integral(&change, start, end);
+        exact += integral(change, start, end);
         error += 0.5 * (change(begin) + change(end)) * (end - begin) - exact;
         largest = largest.max(error.abs());
     }

@@ -8,8 +8,9 @@ use crate::effect::{ElasticStick, Penetration};
 use crate::interrupt;
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{Convergence, Verdict};
+use crate::solve::{Convergence, Verdict, size};
 use crate::system::Slot;
+use crate::tensor::Vec3;
 use crate::warning::WarningKind;
 
 /// The largest relative error of the curvature of two-node elements with total vectors, over the
@@ -18,6 +19,9 @@ const FRAME_ERROR: f64 = 0.0533;
 
 /// The tolerance, relative, of a balance that a stage before has found.
 const LOOSE_BALANCE: f64 = 1e-5;
+
+/// A motion below this, in lengths of the scene and radians, is round-off.
+const MOVED: f64 = 1e-12;
 
 /// The way that friction may give, over the radius.
 const MOST_GIVEN: f64 = 0.2;
@@ -74,11 +78,25 @@ impl StageRun<'_> {
         self.assembly.evaluate(self.state, Weights::NONE, None);
         let loose = Convergence { tolerance: LOOSE_BALANCE, negligible: 0.0 };
         let verdict = loose.judge(self.model, &self.assembly.system, round_off, None).verdict;
-        if !matches!(verdict, Verdict::Converged | Verdict::Noisy) {
+        if !matches!(verdict, Verdict::Converged | Verdict::Noisy) && self.is_away_from_equilibrium() {
             let message = "the modal or buckling stage does not start from an equilibrium: put a static stage before \
                            it";
             self.warn(WarningKind::OutOfBalance, message);
         }
+    }
+
+    /// True if Newton's first correction moves the state noticeably. Where no force but round-off acts
+    /// its balance tells nothing.
+    fn is_away_from_equilibrium(&mut self) -> bool {
+        let Self { assembly, newton, state, model, counters, .. } = self;
+        assembly.forget();
+        assembly.evaluate(state, Weights::STIFFNESS, None);
+        let mut correction = vec![Vec3::ZERO; state.q.len()];
+        counters.work.factorisations += 1;
+        let solver = &mut newton.solver;
+        let is_known =
+            solver.factorise(&assembly.system) && solver.correct(&assembly.system, true, None, &mut correction);
+        !is_known || size(model, &correction) > MOVED
     }
 
     /// Warns of a static stage that ends with penetrations between the points of contact. Those at

@@ -6,7 +6,8 @@ use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
 use crate::scene::mesh::{BeamElement, MeshBeam};
 use crate::scene::names;
 use beamsim_core::effect::inertia::{
-    BeamMass, BeamMassDamping, Body, BodyMassDamping, RigidBody, RotaryInertia, RotatingFrame, SectionInertia,
+    BeamMass, BeamMassDamping, Body, BodyMassDamping, FrameMotion, FrameRamp, RigidBody, RotaryInertia, RotatingFrame,
+    SectionInertia,
 };
 use beamsim_core::effect::load::{BeamGravity, BodyGravity};
 use beamsim_core::effect::{ByOrder, VolumeElements};
@@ -16,6 +17,7 @@ use beamsim_core::model::beam_element::{
     ElementGeometry, NodalInertia, PlacedNode, Rule, Station, body_inertia, push_volume,
 };
 use beamsim_core::tensor::{Mat3, Vec3};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 impl Composer<'_> {
@@ -119,37 +121,67 @@ impl Composer<'_> {
 
     /// For each stage with a `frame` an effect of its own.
     pub(super) fn rotating_frames(&mut self) {
-        let framed: Vec<(usize, deck::Stage)> =
-            self.deck.stages.iter().cloned().enumerate().filter(|(_, stage)| stage.frame.is_some()).collect();
+        let framed = self.framed_stages();
         if framed.is_empty() {
             return self.reason("rotating frame", false, "no stage has a `frame`");
         }
-        // One amplitude for all static stages: what one has brought in stays for the next.
-        let ramped: Vec<usize> =
-            framed.iter().filter(|(_, stage)| stage.body.kind().ramps_load()).map(|(k, _)| k + 1).collect();
-        let amplitude = if ramped.is_empty() { None } else { self.amplitude(None, Some(&ramped)) };
+        let mut ramps = self.frame_ramps(&framed);
         let (elements, nodal) =
             self.inertia_elements(|element, station, inertia| (inertia, element.between(&station.shape)));
         let bodies = [nodal, self.out.bodies.clone()].concat();
-        for (number, stage) in &framed {
-            let Some(frame) = &stage.frame else { continue };
-            let about = match frame.about.as_ref().map_or(Ok(Vec3::ZERO), |point| names::place(self.deck, point)) {
-                Ok(place) => place,
-                Err(diagnostic) => {
-                    self.diagnostics.push(diagnostic);
-                    continue;
-                }
-            };
+        for (&stage, &motion) in &framed {
+            let (elements, bodies) = (elements.clone(), bodies.clone());
             self.out.effects.push(Arc::new(RotatingFrame {
-                stage: *number,
-                spin: Vec3(frame.spin),
-                about,
-                amplitude: amplitude.filter(|_| stage.body.kind().ramps_load()),
-                elements: elements.clone(),
-                bodies: bodies.clone(),
+                stage,
+                motion,
+                ramp: ramps.remove(&stage),
+                elements,
+                bodies,
             }));
         }
         self.reason("rotating frame", true, format!("{} stage(s) with a `frame`", framed.len()));
+    }
+
+    /// The motions of the frames of stages, by their numbers from 0.
+    fn framed_stages(&mut self) -> BTreeMap<usize, FrameMotion> {
+        let mut framed = BTreeMap::new();
+        for (number, stage) in self.deck.stages.iter().enumerate() {
+            let Some(frame) = &stage.frame else { continue };
+            match frame.about.as_ref().map_or(Ok(Vec3::ZERO), |point| names::place(self.deck, point)) {
+                Ok(about) => drop(framed.insert(number, FrameMotion { spin: Vec3(frame.spin), about })),
+                Err(diagnostic) => self.diagnostics.push(diagnostic),
+            }
+        }
+        framed
+    }
+
+    /// How static stages come to the motions of their frames: from that of the stage before, or from
+    /// rest about the same axis. Stages with one motion have one amplitude: what one has brought in
+    /// stays for the next.
+    fn frame_ramps(&mut self, framed: &BTreeMap<usize, FrameMotion>) -> BTreeMap<usize, FrameRamp> {
+        let deck = self.deck;
+        let moving = deck.stages.iter().enumerate().filter(|(_, stage)| stage.body.kind().advances_state());
+        let mut groups: Vec<(FrameMotion, Vec<usize>)> = Vec::new();
+        let mut before: Option<FrameMotion> = None;
+        for (number, stage) in moving {
+            let motion = framed.get(&number).filter(|_| stage.body.kind().ramps_load()).copied();
+            match (motion, groups.last_mut()) {
+                (Some(motion), Some((_, group))) if before == Some(motion) => group.push(number),
+                (Some(motion), _) => {
+                    let at_rest = FrameMotion { spin: Vec3::ZERO, about: motion.about };
+                    groups.push((before.unwrap_or(at_rest), vec![number]));
+                }
+                (None, _) => {}
+            }
+            before = motion;
+        }
+        let mut ramps = BTreeMap::new();
+        for (from, group) in groups {
+            let numbers: Vec<usize> = group.iter().map(|stage| stage + 1).collect();
+            let Some(amplitude) = self.amplitude(None, Some(&numbers)) else { continue };
+            ramps.extend(group.into_iter().map(|stage| (stage, FrameRamp { from, amplitude })));
+        }
+        ramps
     }
 
     /// Visits the elements with the mass properties of their volume points, about the centre line

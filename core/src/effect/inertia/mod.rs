@@ -15,7 +15,7 @@ pub use fading::{FadingInertia, fading_force};
 pub use mass_damping::{BeamMassDamping, BodyMassDamping};
 pub use rigid_body::{Body, RigidBody};
 pub use rotary::RotaryInertia;
-pub use rotating_frame::RotatingFrame;
+pub use rotating_frame::{FrameMotion, FrameRamp, RotatingFrame};
 pub use section::SectionInertia;
 
 use crate::kernel::inertia::Inertia;

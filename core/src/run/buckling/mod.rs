@@ -48,9 +48,14 @@ const NEAREST_EXTRAPOLATION: f64 = 5e-3;
 /// Looks of one extrapolation.
 const MOST_EXTRAPOLATIONS: usize = 48;
 
+/// A path that moves by less than this up to a critical load, in lengths of the scene and radians, has no
+/// limit point there: what it moves is round-off.
+const STANDS_STILL: f64 = 1e-2;
+
 /// The message about a scene without critical loads.
-const NOTHING_BUCKLES: &str = "no load of this scene reduces its stiffness, so it cannot buckle (follower loads may \
-                               cause flutter: use a modal stage)";
+const NOTHING_BUCKLES: &str = "no load factor is found at which the scene loses its stiffness: its loads do not reduce \
+                               it, or they are of a kind that makes vibrations grow (follower loads, moments fixed in \
+                               space): look for the load at which a frequency of modal stages becomes zero, or grows";
 
 /// Limit points whose loads differ by less, relative to the load, are one point.
 const SAME_LIMIT: f64 = 1e-6;
@@ -269,7 +274,8 @@ impl Buckling<'_, '_> {
     fn kind_of_critical(&mut self, at_start: &Response) -> Result<CriticalKind, Failure> {
         let here = self.response()?;
         let works = here.work.zip(at_start.work).is_none_or(|(now, first)| now.abs() > WORK_RUNS_AWAY * first.abs());
-        let runs_away = here.size > RUNS_AWAY * at_start.size && works;
+        let moves = here.size * self.stage.state.load.abs() > STANDS_STILL;
+        let runs_away = here.size > RUNS_AWAY * at_start.size && moves && works;
         Ok(if runs_away { CriticalKind::Limit } else { CriticalKind::Branch })
     }
 

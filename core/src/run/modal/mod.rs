@@ -4,7 +4,7 @@ mod rigid;
 mod search;
 mod vibrations;
 
-pub(super) use vibrations::{Vibrations, vibrations};
+pub(super) use vibrations::{Vibrations, pivots_tell, vibrations};
 
 use self::rigid::{free_spins, rigid_motions};
 use self::search::{Found, find_modes, first_shift, grows, matrices};

@@ -4,7 +4,7 @@
 use crate::kernel::Weights;
 use crate::run::failure::Failure;
 use crate::run::findings::{StabilityVerdict, StageStability};
-use crate::run::modal::{Vibrations, vibrations};
+use crate::run::modal::{Vibrations, pivots_tell, vibrations};
 use crate::run::results::{Event, EventKind, Mode};
 use crate::run::spatial::SpatialLook;
 use crate::run::stage_run::StageRun;
@@ -102,7 +102,7 @@ pub(super) fn conclude(
     on_limit: bool,
 ) -> Result<(), Failure> {
     stage.unless_interrupted()?;
-    let negative = signature.and_then(Signature::negative);
+    let negative = signature.and_then(Signature::negative).filter(|&count| pivots_tell(count, stage.stage().rotating));
     stage.warn_of_instability(negative);
     let number = stage.number + 1;
     let aside = match negative {
