@@ -117,6 +117,8 @@ warning_kinds! {
     HistoryKinks: "history_kinks", Deck;
     /// A load changes between the ends of fixed time steps.
     MissedLoad: "missed_load", Time;
+    /// Stretching or shear is so stiff that bending is lost in its round-off.
+    ExtremeStiffness: "extreme_stiffness", RoundOff;
     /// An element turns far from node to node.
     CoarseMesh: "coarse_mesh", Mesh;
     /// The estimated error of a computed section is large, or larger than `mesh` asks for.

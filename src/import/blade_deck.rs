@@ -24,6 +24,13 @@ const LONGEST_ELEMENT: f64 = 1.0 / 16.0;
 /// are over z, those of a deck over the sum of chords.
 const SAMPLES: usize = 4;
 
+/// The largest difference, in rad, of the twist between stations from that of the blade's spline: between
+/// stations of a deck it is linear.
+const LINEAR_TWIST: f64 = 1e-3;
+
+/// Places between two stations at which the twist is compared.
+const TWIST_SAMPLES: usize = 16;
+
 /// The deck of a blade that is clamped at its root: with the loads of a driver, or with its modes.
 pub fn blade_deck(blade: &Blade, driver: Option<&Driver>) -> Imported {
     let axis = Axis::new(blade);
@@ -174,6 +181,20 @@ impl Axis {
         format!("{}@{}", self.beam_name(member), number(self.members[member].own(place)))
     }
 
+    /// Parts of the way between two places, on one member, in which the twist is nearly linear.
+    fn parts_of_linear_twist(&self, [from, to]: [f64; 2]) -> usize {
+        let holds = |member: &&Member| to <= member.end + 2.0 * ONE_PLACE;
+        let Some(member) = self.members.iter().find(holds) else { return 1 };
+        let part = |k: usize| k as f64 / TWIST_SAMPLES as f64;
+        let mut angles: Vec<f64> =
+            (0..=TWIST_SAMPLES).map(|k| member.angle(member.own(from + (to - from) * part(k)))).collect();
+        continue_turns(&mut angles);
+        let linear = |k: usize| angles[0] + (angles[TWIST_SAMPLES] - angles[0]) * part(k);
+        let off = (0..=TWIST_SAMPLES).map(|k| (angles[k] - linear(k)).abs()).fold(0.0, f64::max);
+        // The difference falls with the square of the length.
+        (off / LINEAR_TWIST).sqrt().ceil().max(1.0) as usize
+    }
+
     /// Fractions of the length of the blade at which stations of its sections stand for key points.
     fn key_places(&self) -> impl Iterator<Item = f64> {
         self.members.iter().flat_map(|member| member.keys.iter().map(|key| member.start + key / self.length))
@@ -196,7 +217,8 @@ struct Station {
 }
 
 /// Fractions of the length at which the deck has stations and elements end: the stations of the
-/// blade file, ends of members, key points, between which the twist varies, and point loads.
+/// blade file, ends of members, key points, point loads, and places between these where the twist
+/// bends.
 fn places(blade: &Blade, axis: &Axis, driver: Option<&Driver>) -> Vec<f64> {
     let own: Vec<f64> = blade.stations.iter().map(|station| station.eta).collect();
     let is_away = |place: &f64| {
@@ -217,7 +239,13 @@ fn places(blade: &Blade, axis: &Axis, driver: Option<&Driver>) -> Vec<f64> {
             Some(_) | None => kept.push((place, is_own)),
         }
     }
-    kept.into_iter().map(|(place, _)| place).collect()
+    let stations: Vec<f64> = kept.into_iter().map(|(place, _)| place).collect();
+    let divided = |pair: &[f64]| -> Vec<f64> {
+        let [from, to] = [pair[0], pair[1]];
+        let parts = axis.parts_of_linear_twist([from, to]);
+        (1..parts).map(|k| from + (to - from) * k as f64 / parts as f64).chain([to]).collect()
+    };
+    stations[..1].iter().copied().chain(stations.windows(2).flat_map(divided)).collect()
 }
 
 /// The one of these places, which increase, that is next to a place.

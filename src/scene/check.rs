@@ -294,6 +294,33 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
     }
 }
 
+/// The stiffness of a beam against stretching and shear, over its bending stiffness and with its length, from
+/// which round-off of the first is felt in the second: more than a thousandth of it.
+const EXTREME_STIFFNESS: f64 = 1e13;
+
+/// Warns of beams that are meant to be rigid in some direction, and lose the digits of the others.
+pub fn warn_of_extreme_stiffness(mesh: &Mesh, deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    for (beam, table) in mesh.beams.iter().zip(&deck.beams) {
+        let ratio = |s: f64| {
+            let stiffness = beam.section.at(s).stiffness;
+            let stiffest = (0..3).map(|k| stiffness[k][k]).fold(0.0, f64::max);
+            stiffest * beam.line.length.powi(2) / stiffness[4][4].min(stiffness[5][5])
+        };
+        let ratio = ratio(0.0).max(ratio(1.0));
+        if ratio > EXTREME_STIFFNESS {
+            let message = format!(
+                "beam `{}` resists stretching or shear {ratio:.0e} times as much as bending: about {:.0} of 16 digits are \
+                 lost in round-off",
+                beam.name,
+                ratio.log10()
+            );
+            let help = "EA and GA of 1e6 EI/length^2 are as good as rigid: displacements change by less than 1e-5";
+            let diagnostic = Diagnostic::warning(WarningKind::ExtremeStiffness, message, table.name.span.clone());
+            diagnostics.push(diagnostic.help(help));
+        }
+    }
+}
+
 /// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither
 /// inertia nor a spring nor a constraint touches are held, so that the tangent stays regular.
 pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held: &[Support]) -> Vec<Support> {

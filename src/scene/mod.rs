@@ -319,6 +319,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     // names are kept.
     diagnostics.extend(found.into_iter().filter(|d| complete || d.unknown.is_some()));
     check::warn_of_undamped_multipliers(deck, &composition, diagnostics);
+    check::warn_of_extreme_stiffness(&mesh, deck, diagnostics);
     let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
     let is_sprung = |spring: &&GroundSpring| spring.rotation != Mat3::ZERO;

@@ -214,6 +214,38 @@ expected {told}"
     }
 }
 
+/// Key points far apart, whose spline bends the twist between them: the deck follows it with stations of its own.
+#[test]
+fn the_twist_of_a_blade_follows_its_spline() {
+    let primary = text("nrel_5mw.dat");
+    let keys = |count: usize, points: &str| -> String {
+        let head = primary.split("kp_total").next().unwrap().rsplit_once('\n').unwrap().0;
+        let tail = &primary[primary.find("---------------------- MESH PARAMETER").unwrap()..];
+        format!(
+            "{head}\n {count} kp_total\n 1 {count}\nkp_xr kp_yr kp_zr initial_twist\n(m) (m) (m) (deg)\n{points}{tail}"
+        )
+    };
+    let deck = nrel(&keys(3, "0 0 0 0\n0 0 30.75 30\n0 0 61.5 0\n"), &text("nrel_5mw_blade.dat"), None).unwrap();
+    let numbers = |key: &str| -> Vec<f64> {
+        let line = deck.lines().find(|line| line.starts_with(key)).unwrap();
+        let list = line[line.find('[').unwrap() + 1..line.find(']').unwrap()].split(", ");
+        list.map(|number| number.parse().unwrap()).collect()
+    };
+    let (places, twist) = (numbers("stations ="), numbers("twist ="));
+    // The natural spline through 0, 30 and 0 degrees, the opposite sign about axis 1.
+    let spline = |place: f64| {
+        let s = 1.0 - (2.0 * place - 1.0).abs();
+        -30.0_f64.to_radians() * (1.5 * s - 0.5 * s.powi(3))
+    };
+    for k in 1..places.len() {
+        for part in [0.0, 0.3, 0.5, 0.8] {
+            let linear = |list: &[f64]| list[k - 1] + (list[k] - list[k - 1]) * part;
+            let error = (linear(&twist) - spline(linear(&places))).abs();
+            assert!(error < 1.2e-3, "{error} between {} and {}", places[k - 1], places[k]);
+        }
+    }
+}
+
 /// The deck of a turbine of windIO.
 fn windio(yaml: &str) -> Result<String, String> {
     let blade = read_windio("t.yaml", yaml).map_err(|error| error.to_string())?;

@@ -14,7 +14,7 @@ fn starter_decks_run_and_are_never_overwritten() {
         let checked = folder.beamsim(&["check", &deck]);
         let said = String::from_utf8_lossy(&checked.stderr).into_owned();
         assert!(status(&checked) == 0 && said.is_empty(), "{template}: {said}");
-        let run = folder.beamsim(&["run", &deck]);
+        let run = folder.beamsim(&["run", &deck, "--deny-warnings"]);
         assert_eq!(status(&run), 0, "{template}: {}", last_line(&run));
         assert!(fs::read_to_string(folder.0.join(&deck)).unwrap().starts_with("#:schema ./beamsim.schema.json\n"));
     }

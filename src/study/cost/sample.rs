@@ -371,4 +371,21 @@ mod tests {
         assert_eq!((many.len(), many.last()), (204, Some(&2000)));
         assert_eq!(thinned(0).count(), 0);
     }
+
+    #[test]
+    fn instants_leave_the_last_row_to_itself() {
+        let deck = |stages: &str| {
+            let text = format!("[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 1\n{stages}");
+            crate::deck::read(&text).unwrap_or_else(|found| panic!("{}", found[0].message)).0
+        };
+        let clocks = |deck: &Deck| -> Vec<(usize, f64)> {
+            instants(deck, Pace::Steps(1.0), 0).into_iter().map(|at| (at.stage, at.clock)).collect()
+        };
+        let dynamic =
+            |end: f64| format!("[[stage]]\nkind = \"dynamic\"\nend = {end:?}\nstep = 0.25\nscheme = \"newmark\"\n");
+        assert_eq!(clocks(&deck(&dynamic(0.75))), [(1, 0.25), (1, 0.5)]);
+        assert_eq!(clocks(&deck(&dynamic(0.6))), [(1, 0.25), (1, 0.5)]);
+        let two = dynamic(0.5) + &dynamic(1.0);
+        assert_eq!(clocks(&deck(&two)), [(1, 0.25), (1, 0.5), (2, 0.75)]);
+    }
 }
