@@ -227,16 +227,16 @@ fn the_twist_of_a_blade_follows_its_spline() {
     };
     let deck = nrel(&keys(3, "0 0 0 0\n0 0 30.75 30\n0 0 61.5 0\n"), &text("nrel_5mw_blade.dat"), None).unwrap();
     let numbers = |key: &str| -> Vec<f64> {
-        let line = deck.lines().find(|line| line.starts_with(key)).unwrap();
-        let list = line[line.find('[').unwrap() + 1..line.find(']').unwrap()].split(", ");
-        list.map(|number| number.parse().unwrap()).collect()
+        let list = deck.split_once(key).unwrap().1.split_once(']').unwrap().0;
+        list.split([' ', ',', '[', '\n']).filter_map(|number| number.parse().ok()).collect()
     };
-    let (places, twist) = (numbers("stations ="), numbers("twist ="));
+    let (places, twist) = (numbers("\nstations ="), numbers("\ntwist ="));
     // The natural spline through 0, 30 and 0 degrees, the opposite sign about axis 1.
     let spline = |place: f64| {
         let s = 1.0 - (2.0 * place - 1.0).abs();
         -30.0_f64.to_radians() * (1.5 * s - 0.5 * s.powi(3))
     };
+    assert!(places.len() == twist.len() && places.len() > 20, "{deck}");
     for k in 1..places.len() {
         for part in [0.0, 0.3, 0.5, 0.8] {
             let linear = |list: &[f64]| list[k - 1] + (list[k] - list[k - 1]) * part;
