@@ -89,3 +89,23 @@ fn double_branches_are_listed_twice() {
     assert!((one.load / other.load - 1.0).abs() < 1e-5);
     assert_eq!([one.kind, other.kind], [CriticalKind::Branch; 2]);
 }
+
+/// A column that heat presses between fixed ends does not move, in whatever direction it stands: its loads are branches.
+#[test]
+fn loads_of_a_heated_column_are_branches_in_all_directions() {
+    let mut random = Random::new(93);
+    for _ in 0..6 {
+        let axis = random.direction();
+        let deck = format!(
+            "[point]\na = [0, 0, 0]\nb = {}\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1\nEI = [1, 2.3]\n[[beam]]\nname = \"c\"\n\
+             section = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 6\norder = 3\nfree_strain = [1e-4, 0, 0, 0, 0, 0]\n\
+             [[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"b\"\nfix = \"all\"\n[[stage]]\nkind = \"static\"\nsteps = 1\n\
+             [[stage]]\nkind = \"buckling\"\nmodes = 2\n",
+            list(axis)
+        );
+        let found = critical_loads(&deck);
+        // Clamped at both ends: N = 4 pi^2 EI/L^2, where N = 1 at the load factor 1; shear takes some of it.
+        assert!((found[0].load / 39.478 - 1.0).abs() < 5e-3, "{found:?}");
+        assert!(found.iter().all(|critical| critical.kind == CriticalKind::Branch), "{found:?}");
+    }
+}

@@ -442,3 +442,21 @@ fn round_off_is_not_out_of_balance() {
     let warned = simulate(&pulled).counters.findings.warnings;
     assert!(warned.iter().any(|warning| warning.kind == WarningKind::OutOfBalance), "{warned:?}");
 }
+
+/// A bead that lies on the true arc, off the smooth curve through the nodes of a coarse one, begins a dynamic stage: it swings
+/// to the other side.
+#[test]
+fn a_bead_beside_the_line_begins_a_dynamic_stage() {
+    let held: String = (0..=24).map(|node| format!("[[support]]\nat = \"R:{node}\"\nfix = \"all\"\n")).collect();
+    let (sin, cos) = 1.0_f64.sin_cos();
+    let deck = format!(
+        "gravity = [0, 0, -9.81]\n[point]\na = [-1.0, 0, 0]\nb = [1.0, 0, 0]\np = [{:?}, 0, {:?}]\n[section.s]\nEA = 1e8\nGA = 1e8\n\
+         GJ = 1e7\nEI = 1e7\n[[beam]]\nname = \"R\"\nsection = \"s\"\narc = [\"a\", [0, 0, -1.0], \"b\"]\nelements = 24\n{held}\
+         [[body]]\nat = \"p\"\nmass = 2.0\n[[slider]]\nnodes = [\"p\"]\non = \"R\"\n[[stage]]\nkind = \"dynamic\"\nend = 1.09\n\
+         step = 0.002\nscheme = \"generalized_alpha\"\nrho_inf = 0.95\n[output]\ncolumns = [\"x\"]\nnodes = [\"p\"]\n",
+        -sin, -cos
+    );
+    let x = simulate(&deck).column("p.x");
+    let farthest = x.iter().fold(f64::MIN, |m, x| m.max(*x));
+    assert!((x[0] + sin).abs() < 1e-12 && (farthest - sin).abs() < 1e-3, "{farthest}");
+}

@@ -1,7 +1,7 @@
 //! Warnings and the stability of static stages as data: their names, run.json, and what decks expect of them.
 
 use super::folder::{Folder, last_line, status};
-use crate::scenes::simulate;
+use crate::scenes::{simulate, warnings};
 use beamsim_core::run::{StabilityVerdict, StageStability};
 use beamsim_core::warning::WarningKind;
 use serde_json::Value;
@@ -204,5 +204,25 @@ fn lobatto_is_warned_of_where_beams_have_joints_with_multipliers() {
         let text = beamsim::deck::apply(&file(deck), &["stage.0.scheme=\"lobatto\"".into()]).unwrap();
         let (_, diagnostics) = beamsim::scene::from_text(&text).unwrap_or_else(|e| panic!("{e:?}"));
         assert_eq!(format!("{diagnostics:?}").contains("UndampedMultipliers"), is_told, "{deck}: {diagnostics:?}");
+    }
+}
+
+/// Sections that are meant to be rigid in some direction: from EA = 1e13 EI/L^2 on, whatever the unit of length.
+#[test]
+fn beams_too_stiff_to_compute_are_told() {
+    for length in [1e-3_f64, 1.0, 1e3] {
+        let told = |ratio: f64, key: &str| {
+            let [stiff, other] = [ratio / length.powi(2), 1e6 / length.powi(2)];
+            let (ea, ga) = if key == "EA" { (stiff, other) } else { (other, stiff) };
+            let deck = format!(
+                "[point]\na = [0, 0, 0]\nb = [0, 0, {length:?}]\n[section.s]\nEA = {ea:?}\nGA = {ga:?}\nGJ = 1\nEI = [1, 2]\n[[beam]]\n\
+                 name = \"c\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 2\n[[support]]\nat = \"a\"\nfix = \"all\"\n\
+                 [[load]]\nat = \"b\"\nforce = [1, 0, 0]\n[[stage]]\nkind = \"static\"\nsteps = 1\n"
+            );
+            warnings(&deck).iter().any(|message| message.contains("resists stretching or shear"))
+        };
+        for key in ["EA", "GA"] {
+            assert!(!told(5e12, key) && told(2e13, key), "{length} {key}");
+        }
     }
 }

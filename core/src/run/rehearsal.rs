@@ -1,5 +1,5 @@
 //! Faults of a plan that show before anything is computed: stages that cannot begin, and histories
-//! that jump.
+//! that jump, or change where time steps do not see it.
 //!
 //! Loads, motions and motors go through their stages as in a run, on a state in which nothing but
 //! prescribed motions moves.

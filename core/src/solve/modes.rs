@@ -438,9 +438,11 @@ impl<'a> ModeSearch<'a> {
     /// the other, or if verification fails.
     fn motion(&self, spectrum: &Spectrum, number: usize) -> Option<SmallMotion> {
         let theta = spectrum.values[number];
-        let checked = || self.check(spectrum, number, self.form.exponent(self.shift, theta));
-        let motion = if self.is_told(theta) { checked() } else { None };
-        motion.map(|motion| SmallMotion { exponent: self.exponents(theta).0, ..motion })
+        if !self.is_told(theta) {
+            return None;
+        }
+        let motion = self.check(spectrum, number, self.form.exponent(self.shift, theta))?;
+        Some(SmallMotion { exponent: self.exponents(theta).0, ..motion })
     }
 
     /// The exponent of an eigenvalue that is told, and of the motion of its complex conjugate, which
@@ -448,21 +450,19 @@ impl<'a> ModeSearch<'a> {
     /// twice, which is real or imaginary.
     fn exponents(&self, theta: Complex<f64>) -> (Complex<f64>, Option<Complex<f64>>) {
         let s = self.form.exponent(self.shift, theta);
+        if theta.im == 0.0 || self.form == ProblemForm::Symmetric {
+            return (s, None);
+        }
         let is_negligible = |part: f64| part.abs() <= MIN_FLUTTER_RATIO * s.norm();
+        let twice = |double: Complex<f64>| (double, Some(double));
+        if is_negligible(s.im) {
+            return twice(s.re.into());
+        }
         match self.form {
-            ProblemForm::Symmetric => (s, None),
-            ProblemForm::Undamped | ProblemForm::Gyroscopic | ProblemForm::General if theta.im == 0.0 => (s, None),
-            ProblemForm::Undamped | ProblemForm::Gyroscopic | ProblemForm::General if is_negligible(s.im) => {
-                let double = Complex::from(s.re);
-                (double, Some(double))
-            }
-            ProblemForm::Undamped if is_negligible(s.re) => {
-                let double = Complex::new(0.0, s.im);
-                (double, Some(double))
-            }
+            ProblemForm::Undamped if is_negligible(s.re) => twice(Complex::new(0.0, s.im)),
             // Flutter: if s is an exponent, so is -s* (complex conjugate), of equal frequency.
             ProblemForm::Undamped => (s, Some(-s.conj())),
-            ProblemForm::Gyroscopic | ProblemForm::General => (s, None),
+            ProblemForm::Symmetric | ProblemForm::Gyroscopic | ProblemForm::General => (s, None),
         }
     }
 
