@@ -20,6 +20,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -123,10 +124,10 @@ class Bench:
 
     def run(self, text, steps, left_out):
         """Instructions outside the functions that are left out, and iterations, of a run."""
-        deck, out, counts = (self.folder / name for name in ("deck.toml", "out", "counts"))
+        # One for each run: the results of an earlier one would be read, to tell whose they are.
+        folder = Path(tempfile.mkdtemp(dir=self.folder))
+        deck, out, counts = (folder / name for name in ("deck.toml", "out", "counts"))
         deck.write_text(text.format(steps=steps))
-        # The results of the run before would be read, to tell whose they are.
-        shutil.rmtree(out, ignore_errors=True)
         command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={counts}"]
         command += [str(self.program), "run", str(deck), "--out", str(out)]
         done = subprocess.run(command, capture_output=True, text=True, env=os.environ | NO_REPEATED_BYTES)
@@ -137,7 +138,12 @@ class Bench:
         report = json.loads((out / "run.json").read_text())
         return own_instructions(counts, left_out), report["counters"]["iterations"]
 
-    def cost(self, text, left_out=ALLOCATOR):
+    def costs(self, texts, left_out=ALLOCATOR):
+        """Instructions for an element and an iteration of each scene; as many are run at once as there are cores."""
+        with ThreadPoolExecutor(os.cpu_count()) as threads:
+            return list(threads.map(lambda text: self.cost(text, left_out), texts))
+
+    def cost(self, text, left_out):
         """Instructions for an element and an iteration."""
         (few, at_few), (many, at_many) = (self.run(text, steps, left_out) for steps in (FEW, MANY))
         return (many - few) / (at_many - at_few) / ELEMENTS
@@ -171,7 +177,7 @@ def record(costs):
 
 def present(bench, bless):
     """Whether what is there costs no more than it did."""
-    before, costs = recorded(), {name: bench.cost(text) for name, text in SCENES.items()}
+    before, costs = recorded(), dict(zip(SCENES, bench.costs(SCENES.values())))
     if bless:
         record(costs)
         before = recorded()
@@ -187,8 +193,8 @@ def present(bench, bless):
 def absent(bench):
     """Whether what is absent costs nothing."""
     fine = True
-    for name, texts in ABSENT.items():
-        without, inert = (bench.cost(text, ALLOCATOR_AND_COPIES) for text in texts)
+    costs = iter(bench.costs([text for pair in ABSENT.values() for text in pair], ALLOCATOR_AND_COPIES))
+    for name, without, inert in zip(ABSENT, costs, costs):
         holds = inert - without <= SAME * without
         fine &= holds
         print(f"{'ok ' if holds else 'X  '} absent: {name:<28} {inert:8.0f} instead of {without:.0f}")

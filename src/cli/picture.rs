@@ -10,7 +10,7 @@ pub struct PlotArguments {
     /// Folders of results, or histories (CSV); several are drawn on the same axes. Or a profile.csv:
     /// resultants and stresses along beams
     #[arg(required = true, value_name = "RESULTS")]
-    pub results: Vec<PathBuf>,
+    pub(crate) results: Vec<PathBuf>,
     /// A column, such as tip.ux; may be repeated (default: the first six displacements that change;
     /// without displacements, the first six columns)
     #[arg(long = "column", value_name = "COLUMN")]

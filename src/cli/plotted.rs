@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 /// The run that a table belongs to.
 pub struct PlottedRun {
     /// The folder of the run; none of a table with another name than runs give
-    pub folder: Option<PathBuf>,
+    pub(crate) folder: Option<PathBuf>,
     /// The record, if run.json is beside the table
     pub record: Option<Record>,
     /// How the run ended, if it did not finish
-    pub failure: Option<String>,
+    pub(crate) failure: Option<String>,
 }
 
 impl PlottedRun {

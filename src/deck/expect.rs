@@ -16,7 +16,7 @@ pub struct Expect {
     /// Origin of the number
     pub(crate) source: Option<String>,
     /// Place of the table
-    pub span: Span,
+    span: Span,
 }
 
 /// Kinds of expectations.

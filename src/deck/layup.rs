@@ -24,7 +24,7 @@ pub struct Ply {
     /// Angle of the fibre from axis 1 towards the direction of the wall, rad
     pub theta: f64,
     /// Place of the ply
-    pub span: Span,
+    pub(crate) span: Span,
 }
 
 /// Keys of `[layup.NAME]`.

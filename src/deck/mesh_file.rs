@@ -28,16 +28,16 @@ const STL_TRIANGLE: usize = 50;
 #[derive(Clone, Debug)]
 pub struct MeshTable {
     /// The name of the file
-    pub name: Spanned<String>,
+    pub(crate) name: Spanned<String>,
     /// Its triangles
-    pub data: Arc<str>,
+    data: Arc<str>,
 }
 
 /// Triangles with shared vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Triangles {
     /// Coordinates of the vertices
-    pub vertices: Vec<[f64; 3]>,
+    pub(crate) vertices: Vec<[f64; 3]>,
     /// Numbers of the corners of each triangle
     pub corners: Vec<[u32; 3]>,
 }

@@ -133,7 +133,7 @@ pub struct Deck {
     /// Springs and cables
     pub springs: Vec<Spring>,
     /// Triangles of mesh files
-    pub meshes: Vec<MeshTable>,
+    pub(crate) meshes: Vec<MeshTable>,
     /// Rigid surfaces
     pub(crate) surfaces: Vec<Surface>,
     /// Contacts of beams and bodies with surfaces

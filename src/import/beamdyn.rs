@@ -51,7 +51,7 @@ pub struct Blade {
     /// Second line of the primary file
     pub(super) title: String,
     /// Form of the files
-    pub origin: Origin,
+    pub(crate) origin: Origin,
     /// Name of the primary file
     pub(super) primary: String,
     /// Name of the blade file

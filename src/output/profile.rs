@@ -12,22 +12,22 @@ const PLACE: [&str; 6] = ["stage", "time", "load", "beam", "fraction", "length"]
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProfileReader {
     /// Names of the columns after the place
-    pub names: Vec<String>,
+    pub(crate) names: Vec<String>,
     /// Places, in the order of the file
-    pub rows: Vec<ProfileRow>,
+    pub(crate) rows: Vec<ProfileRow>,
 }
 
 /// A place along a beam at the end of a stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProfileRow {
     /// Number of the stage, from 1
-    pub stage: usize,
+    pub(crate) stage: usize,
     /// Name of the beam
-    pub beam: String,
+    pub(crate) beam: String,
     /// Length from the start of the beam
-    pub length: f64,
+    pub(crate) length: f64,
     /// Numbers after the place; none where a stress is not known
-    pub values: Vec<Option<f64>>,
+    pub(crate) values: Vec<Option<f64>>,
 }
 
 impl ProfileReader {

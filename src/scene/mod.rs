@@ -132,7 +132,7 @@ pub struct Expectation {
     /// Kind, with bounds
     pub(crate) kind: ExpectationKind,
     /// Origin of the number
-    pub source: Option<String>,
+    source: Option<String>,
 }
 
 /// Kinds of expectations.

@@ -14,7 +14,7 @@ from top to bottom:
 - A `text` block shows what the last block of commands under the same heading prints: each of its lines must be there, in order; an ellipsis stands for anything, a
   line of nothing else, like an empty one, for any lines. After `cat FILE` the block that follows is held against the file, whatever its language.
 
-In all pages below docs/, in README.md and CHANGELOG.md relative links must lead to files, and anchors to headings. In the guide they must stay in
+As many pages are worked through at once as there are cores. In all pages below docs/, in README.md and CHANGELOG.md relative links must lead to files, and anchors to headings. In the guide they must stay in
 docs/, since the site holds nothing else; and every page must be in SUMMARY.md. With --site the built HTML is held to the same.
 
 Ends with status 1 if anything fails.
@@ -30,6 +30,7 @@ import subprocess
 import sys
 import tempfile
 import urllib.parse
+from concurrent.futures import ThreadPoolExecutor
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -138,7 +139,7 @@ class Page:
     def fail(self, line, what):
         self.failures.append(f"{self.name}:{line}: {what}")
 
-    def run(self):
+    def worked_through(self):
         self.folder.mkdir(parents=True)
         tools = self.folder / ".bin"
         tools.mkdir()
@@ -165,6 +166,7 @@ class Page:
                 self.compare(block)
             if block.language != "sh":
                 self.cat = False
+        return self
 
     def compare(self, block):
         self.texts += 1
@@ -383,16 +385,18 @@ def main():
     folder = options.keep.resolve() if options.keep else Path(tempfile.mkdtemp(prefix="beamsim-book-"))
     commands = 0
     try:
+        pages = []
         for path in run:
             place = folder / re.sub(r"[^\w-]+", "_", str(path.relative_to(ROOT).with_suffix("")))
             shutil.rmtree(place, ignore_errors=True)
-            page = Page(path, place, beamsim)
-            page.run()
-            commands += page.commands
-            failures += page.failures
-            print(page.summary(), flush=True)
-            for line in page.skipped if options.verbose else []:
-                print(f"    skipped: {line}")
+            pages.append(Page(path, place, beamsim))
+        with ThreadPoolExecutor(os.cpu_count()) as threads:
+            for page in threads.map(Page.worked_through, pages):
+                commands += page.commands
+                failures += page.failures
+                print(page.summary(), flush=True)
+                for line in page.skipped if options.verbose else []:
+                    print(f"    skipped: {line}")
     finally:
         if not options.keep:
             shutil.rmtree(folder, ignore_errors=True)

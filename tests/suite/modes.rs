@@ -18,10 +18,14 @@ struct Hinged {
 impl Hinged {
     fn random(random: &mut Random, damping: f64, spin: f64) -> Self {
         let [mass, inertia, stiffness] = [0, 1, 2].map(|_| 10f64.powf(random.range(-1.0, 1.0)));
-        let arm = random.range(0.1, 2.0);
+        // Damping that is small in these units is no small damping.
+        let [length, weight] = [random.range(-8.0, 3.0), random.range(-20.0, 3.0)].map(|power| 10f64.powf(power));
+        let arm = random.range(0.1, 2.0) * length;
+        let [mass, inertia, stiffness] =
+            [mass * weight, inertia * weight * length.powi(2), stiffness * weight * length.powi(2)];
         let about_hinge = inertia + mass * arm * arm;
         let damping = damping * 2.0 * (stiffness * about_hinge).sqrt();
-        Self { mass, inertia, arm, stiffness, damping, frame: [random.range(0.2, 1.0), spin] }
+        Self { mass, inertia, arm, stiffness, damping, frame: [random.range(0.2, 1.0) * length, spin] }
     }
 
     /// s = growth + i omega

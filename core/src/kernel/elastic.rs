@@ -13,11 +13,11 @@ use crate::tensor::{Mat3, Vec3};
 #[derive(Clone, Copy, Debug)]
 pub struct Point<T = f64> {
     /// R, T and the derivative tensors of the interpolated rotation vector
-    pub(crate) rotation: Rotation<T>,
+    rotation: Rotation<T>,
     /// y = R^T x'
-    pub(crate) y: Vec3<T>,
+    y: Vec3<T>,
     /// P'
-    pub(crate) p_slope: Vec3<T>,
+    p_slope: Vec3<T>,
     /// C1(P')
     c1: Mat3<T>,
 }

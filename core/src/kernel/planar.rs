@@ -304,11 +304,11 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
 #[derive(Clone, Copy, Debug)]
 pub struct PlanarBody<T = f64> {
     /// Mass
-    pub(crate) mass: T,
+    mass: T,
     /// The vector from the node to the mass centre in the initial placement
-    pub(crate) offset: [T; 2],
+    offset: [T; 2],
     /// J0: moment of inertia about the normal of the plane through the node
-    pub(crate) about_node: T,
+    about_node: T,
 }
 
 impl PlanarBody {

@@ -76,6 +76,16 @@ impl SlotKind {
     pub fn scale(self, length: f64) -> f64 {
         if matches!(self, Self::Displacement | Self::Sliding) { length } else { 1.0 }
     }
+
+    /// The [`Self::scale`] of each equation of slots of these kinds, in a scene of this length.
+    pub fn scales(kinds: &[Self], length: f64, dof_map: &DofMap) -> Vec<f64> {
+        let mut scales = vec![1.0; dof_map.count()];
+        for (slot, kind) in (0..).zip(kinds) {
+            let free = dof_map.of(slot).into_iter().filter(|&equation| equation != DofMap::HELD);
+            free.for_each(|equation| scales[equation as usize] = kind.scale(length));
+        }
+        scales
+    }
 }
 
 /// A beam element as changes of chart and the judgement of the mesh see it.
@@ -117,11 +127,11 @@ pub struct Model {
     /// The kind of vector that each slot holds
     pub kinds: Arc<Vec<SlotKind>>,
     /// The names of nodes, by their slots
-    pub(crate) names: Arc<Names>,
+    names: Arc<Names>,
     /// The slots with multipliers
     pub multipliers: Vec<Slot>,
     /// How many joints remember their angle
-    pub(crate) angles: usize,
+    angles: usize,
     /// The slots on which rotational springs act: their unwrapped rotation vectors must be known
     pub(crate) sprung: Vec<Slot>,
     /// The rotations on the two sides of each joint that remembers its angle
@@ -129,7 +139,7 @@ pub struct Model {
     /// How many beam elements there are
     pub(crate) elements: usize,
     /// Rotations and elements that large rotations change the charts of; see [`Self::charted`]
-    pub(crate) rotating: Charted,
+    rotating: Charted,
     /// The effects, in the order in which their forces are added
     pub effects: Vec<Arc<dyn Effect>>,
     /// The factors of loads and springs
@@ -160,6 +170,11 @@ impl Model {
     /// The state before the first stage.
     pub fn rest(&self) -> State {
         State::rest(self.slots(), self.elements, self.amplitudes.len(), self.angles)
+    }
+
+    /// The scales that the equations of this numbering are compared with.
+    pub(crate) fn scales(&self, dof_map: &DofMap) -> Vec<f64> {
+        SlotKind::scales(&self.kinds, self.length, dof_map)
     }
 
     /// Tells whether a slot holds a rotation vector.

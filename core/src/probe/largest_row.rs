@@ -72,9 +72,9 @@ struct Known {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Row {
     /// When
-    pub moment: Moment,
+    pub(crate) moment: Moment,
     /// N1 N2 N3 M1 M2 M3
-    pub resultant: [f64; 6],
+    pub(crate) resultant: [f64; 6],
 }
 
 /// A row that waits.

@@ -38,7 +38,7 @@ pub struct Attempts {
     /// Contacts touch in the last balance.
     pub(super) touches: bool,
     /// Beams touch beams there.
-    pub beams_touch: bool,
+    pub(crate) beams_touch: bool,
 }
 
 /// A failure of a run, with its numbers.

@@ -89,11 +89,11 @@ impl Criterion {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// A value that a point reaches
-    pub least: f64,
+    pub(crate) least: f64,
     /// An upper bound of the largest value
-    pub most: f64,
+    pub(crate) most: f64,
     /// The point that reaches `least`
-    pub at: SearchedPoint,
+    pub(crate) at: SearchedPoint,
 }
 
 /// A node or sample of a section, among those that are searched for a criterion.

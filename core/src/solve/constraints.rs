@@ -80,10 +80,7 @@ impl Constraints {
         }
         let mut is_multiplier = vec![false; pattern.dof_map.count()];
         equations.iter().for_each(|&equation| is_multiplier[equation as usize] = true);
-        let mut scale2 = vec![1.0; pattern.dof_map.count()];
-        for (slot, kind) in slots() {
-            equations_of(slot).for_each(|equation| scale2[equation as usize] = kind.scale(length).powi(2));
-        }
+        let scales = SlotKind::scales(kinds, length, &pattern.dof_map);
         let mut columns: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
         let mut place = |row: u32, column: u32| {
             let entries = || pattern.entries(column).map(|entry| (entry.row, entry.place)).collect();
@@ -97,7 +94,7 @@ impl Constraints {
             let tie = |other: u32| {
                 let of_column = place(other, equation)?;
                 let of_row = place(equation, other)?;
-                let (scale2, diagonal) = (scale2[other as usize], place(other, other)?);
+                let (scale2, diagonal) = (scales[other as usize].powi(2), place(other, other)?);
                 Some(ConstrainedUnknown { equation: other, scale2, of_column, of_row, diagonal })
             };
             let ties: Vec<ConstrainedUnknown> = others.filter_map(tie).collect();

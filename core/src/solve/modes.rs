@@ -6,7 +6,7 @@ use super::linear::LinearSolver;
 use super::pivots::is_symmetric;
 use super::softest::lost_part;
 use crate::interrupt;
-use crate::system::{Symmetry, System};
+use crate::system::{Pattern, Symmetry, System};
 use nalgebra::Complex;
 
 /// A rigid motion is linearly dependent on others if orthogonalisation reduces it to this part of
@@ -23,7 +23,8 @@ const MAX_RESIDUAL_OF_SYMMETRIC: f64 = 1e-3;
 /// Largest relative imbalance of the energies of a mode.
 const MAX_ENERGY_IMBALANCE: f64 = 1e-6;
 
-/// Damping forces below this part of inertia and stiffness forces are taken for zero.
+/// Damping forces below this part of inertia and stiffness forces are taken for zero, with
+/// displacements in lengths of the scene and rotations in radians.
 const NEGLIGIBLE_DAMPING_RATIO: f64 = 1e-14;
 
 /// Inverse iterations after which the slowest motion prevails.
@@ -173,26 +174,29 @@ impl Matrices {
 }
 
 impl<'a> ModeSearch<'a> {
-    /// Search with these matrices, in the space orthogonal to the `rigid` motions.
+    /// Search with these matrices, in the space orthogonal to the `rigid` motions. `scales` are those
+    /// that the equations are compared with.
     pub fn new(
         system: &'a mut System,
         solver: &'a mut LinearSolver,
         matrices: &'a Matrices,
         rigid: Vec<Vec<f64>>,
+        mut scales: Vec<f64>,
     ) -> Self {
-        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        let [stiffest, heaviest, dampest] =
-            [&matrices.stiffness, &matrices.mass, &matrices.damping].map(|values| largest(values));
+        let multipliers: Vec<_> = solver.constraints().into_iter().flat_map(Constraints::equations).collect();
+        // Gaps are neither stiffness nor mass.
+        multipliers.iter().for_each(|&equation| scales[equation] = 0.0);
+        let [stiffest, heaviest, dampest] = [&matrices.stiffness, &matrices.mass, &matrices.damping]
+            .map(|values| largest(&system.pattern, values, &scales));
         let damped = dampest > NEGLIGIBLE_DAMPING_RATIO * (stiffest * heaviest).sqrt();
         let symmetric = is_symmetric(&system.pattern, &matrices.stiffness);
         let form = if !damped {
             if symmetric { ProblemForm::Symmetric } else { ProblemForm::Undamped }
-        } else if symmetric && is_skew(system, &matrices.damping) {
+        } else if symmetric && is_skew(system, &matrices.damping, &scales) {
             ProblemForm::Gyroscopic
         } else {
             ProblemForm::General
         };
-        let multipliers = solver.constraints().into_iter().flat_map(Constraints::equations).collect();
         let mut search = Self {
             system,
             solver,
@@ -611,15 +615,25 @@ fn root(square: Complex<f64>) -> Complex<f64> {
     }
 }
 
-/// True if each entry is the negative of its mirror image.
-fn is_skew(system: &System, values: &[f64]) -> bool {
+/// The largest entry, its row and column in their scales.
+fn largest(pattern: &Pattern, values: &[f64], scales: &[f64]) -> f64 {
+    let of_column = |column: usize| {
+        let sizes = pattern.entries(column as u32).map(|entry| values[entry.place].abs() * scales[entry.row as usize]);
+        sizes.fold(0.0, f64::max) * scales[column]
+    };
+    (0..scales.len()).map(of_column).fold(0.0, f64::max)
+}
+
+/// True if each entry is the negative of its mirror image, with rows and columns in their scales.
+fn is_skew(system: &System, values: &[f64], scales: &[f64]) -> bool {
     if system.pattern.symmetry == Symmetry::Whole {
         return false;
     }
-    let x: Vec<f64> =
-        (0..system.pattern.dof_map.count()).map(|k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract()).collect();
-    let y: Vec<f64> = (0..x.len()).map(|k| 0.5 + (k as f64 * 0.414_213_562_373_095).fract()).collect();
-    // Tested with pseudo-random vectors: y.C x = -x.C y, and x.C x = 0.
+    let pseudo_random = |step: f64| -> Vec<f64> {
+        scales.iter().zip(0..).map(|(scale, k)| scale * (0.5 + (f64::from(k) * step).fract())).collect()
+    };
+    let [x, y] = [0.618_033_988_749_895, 0.414_213_562_373_095].map(pseudo_random);
+    // Tested with two vectors: y.C x = -x.C y, and x.C x = 0.
     let sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     let size = dot(&y, &system.multiply(&sizes, &x));
     let of_x = system.multiply(values, &x);

@@ -14,7 +14,7 @@ use std::ops::Range;
 #[derive(Clone, Debug, PartialEq)]
 pub struct NullVector {
     /// Motion by equation, scaled by the roots of the diagonal so that entries of all units compare
-    pub(crate) entries: Vec<f64>,
+    entries: Vec<f64>,
     /// Motion by equation, in units of the unknowns
     pub(crate) motion: Vec<f64>,
     /// True if the tangent has stiffness against the motion

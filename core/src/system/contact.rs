@@ -46,7 +46,7 @@ pub struct ContactMemory {
     /// its first force to the last one; none if no contact has ended
     pub(crate) shortest: Option<u32>,
     /// True if nothing was near to anything at the last converged state, and nothing rubs
-    pub is_clear: bool,
+    pub(crate) is_clear: bool,
     /// Contacts of each chain: a beam or a body against a surface
     pub(crate) chains: Arc<Vec<ChainMemory>>,
     /// Pairs of beam elements, and their contacts

@@ -65,7 +65,7 @@ pub struct Composition {
     /// The elasticity, for resultants
     pub(super) elasticity: Vec<Arc<dyn StressField>>,
     /// Surfaces and contacts, for pictures
-    pub contacts: Option<Arc<SurfaceContacts>>,
+    pub(crate) contacts: Option<Arc<SurfaceContacts>>,
     /// Rigid bodies
     pub(super) bodies: Vec<Body>,
     /// Springs and cables between nodes

@@ -43,7 +43,7 @@ pub(super) struct Predecessors {
     /// Number of the point that it was
     pub(super) own: Option<usize>,
     /// Numbers of points without a successor of their own that are nearest to it
-    pub(super) merged: Vec<usize>,
+    merged: Vec<usize>,
 }
 
 impl Predecessors {

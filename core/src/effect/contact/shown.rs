@@ -21,9 +21,9 @@ pub enum ContactParty {
 pub struct NodeContact {
     /// The least gap to the surfaces that it may touch, and to beams that it touches; infinite where
     /// there are none
-    pub gap: f64,
+    pub(crate) gap: f64,
     /// The force of all contacts on it (global components)
-    pub force: Vec3,
+    pub(crate) force: Vec3,
 }
 
 /// A node without contact.

@@ -51,36 +51,36 @@ pub(super) enum Bend {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Face {
     /// Numbers of its corners
-    pub corners: [u32; 3],
+    pub(crate) corners: [u32; 3],
     /// Its normal out of the body
-    pub normal: Vec3,
+    pub(crate) normal: Vec3,
     /// Numbers of its edges: from corner 0 to 1, 1 to 2, 2 to 0
-    pub edges: [u32; 3],
+    pub(crate) edges: [u32; 3],
 }
 
 /// An edge between two triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MeshEdge {
     /// Numbers of its ends
-    pub ends: [u32; 2],
+    pub(crate) ends: [u32; 2],
     /// Numbers of its faces
-    pub faces: [u32; 2],
+    pub(crate) faces: [u32; 2],
     /// Its direction
-    pub along: Vec3,
+    pub(crate) along: Vec3,
     /// Its length
-    pub length: f64,
+    pub(crate) length: f64,
     /// The bend of the surface there
-    pub bend: Bend,
+    pub(crate) bend: Bend,
 }
 
 /// The parts of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Parts {
-    pub places: Vec<Vec3>,
-    pub faces: Vec<Face>,
-    pub edges: Vec<MeshEdge>,
+    places: Vec<Vec3>,
+    pub(crate) faces: Vec<Face>,
+    pub(crate) edges: Vec<MeshEdge>,
     /// Normals at the corners: those of the faces, weighted by their angles there
-    pub normals: Vec<Vec3>,
+    pub(crate) normals: Vec<Vec3>,
     /// Numbers of the edges at each corner: from `first[k]` to `first[k + 1]`
     first: Vec<u32>,
     around: Vec<u32>,

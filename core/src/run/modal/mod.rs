@@ -48,8 +48,7 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
         let found = self.find(&matrices)?;
         let mut listed = listed(&found, self.modes);
         if listed.is_empty() && self.modes > 0 {
-            // The masses are too small for their squares to be numbers.
-            return Err(self.stage.describe(StageError::NoMass));
+            return Err(self.not_found());
         }
         for motion in &mut listed {
             self.stage.unless_interrupted()?;
@@ -117,18 +116,21 @@ impl Modal<'_, '_> {
         rigid.extend(free_spins(&assembly.system, model, state));
         self.refuse_massless_mechanisms(matrices)?;
         let moment = self.stage.moment();
-        let StageRun { assembly, newton, observer, counters, number, plan, .. } = &mut *self.stage;
+        let StageRun { assembly, newton, observer, counters, number, plan, model, .. } = &mut *self.stage;
+        let scales = model.scales(&assembly.system.pattern.dof_map);
         let mut teller = Teller { observer: &mut **observer, at: moment, number: *number, stages: plan.stages.len() };
         let shift = first_shift(matrices, &assembly.system);
-        let mut search = ModeSearch::new(&mut assembly.system, &mut newton.solver, matrices, rigid);
+        let mut search = ModeSearch::new(&mut assembly.system, &mut newton.solver, matrices, rigid, scales);
         let tell = &mut |done| teller.tell(done);
         let found = find_modes(&mut search, shift, self.modes, tell, &mut counters.work)?;
         self.stage.unless_interrupted()?;
-        found.ok_or_else(|| {
-            let why = "the modes could not be found: a solve with the tangent failed. Look for stiffnesses or masses \
-                       near the limits of floating-point numbers";
-            self.stage.moment().limit(why)
-        })
+        found.ok_or_else(|| self.not_found())
+    }
+
+    fn not_found(&self) -> Failure {
+        let why = "the modes could not be found: a solve with the tangent failed. Look for stiffnesses or masses near \
+                   the limits of floating-point numbers";
+        self.stage.moment().limit(why)
     }
 
     /// Refuses motions that neither stiffness nor mass holds.

@@ -85,11 +85,12 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
         return Ok(Vibrations::Unknown);
     }
     let at = stage.moment();
-    let StageRun { observer, counters, number, plan, .. } = stage;
+    let StageRun { observer, counters, number, plan, model, .. } = stage;
     let mut teller = Teller { observer: &mut **observer, at, number: *number, stages: plan.stages.len() };
     // The stage itself lies behind.
     teller.tell(1.0)?;
-    let mut search = ModeSearch::new(&mut assembly.system, &mut solver, &matrices, Vec::new());
+    let scales = model.scales(&assembly.system.pattern.dof_map);
+    let mut search = ModeSearch::new(&mut assembly.system, &mut solver, &matrices, Vec::new(), scales);
     let found = timed(&mut counters.work.solve_seconds, || find_growth(&mut search, MODES, ENOUGH_GROWTH));
     counters.work.factorisations += search.factorisations;
     Ok(found.map_or(Vibrations::Unknown, |growth| judge(&growth)))

@@ -21,7 +21,7 @@ pub(super) struct Line {
     /// Offsets of the faces of plies to the left, descending
     pub(super) faces: Vec<f64>,
     /// Region of each ply
-    pub(super) regions: Vec<usize>,
+    regions: Vec<usize>,
     /// The wall tangent of the plies: always that of the wall as it was given
     pub(super) tangent: Tangent,
 }

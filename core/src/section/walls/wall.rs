@@ -28,13 +28,13 @@ pub struct Bend {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wall {
     /// Indices of its points
-    pub ends: [usize; 2],
+    pub(crate) ends: [usize; 2],
     /// Its curve, if it is not straight
     pub(super) bend: Option<Bend>,
     /// Distance from the line between the points to the left face, looking along the wall
     pub(super) left: f64,
     /// Plies from left to right; a clockwise closed line has its outside on the left
-    pub plies: Vec<Ply>,
+    pub(crate) plies: Vec<Ply>,
 }
 
 /// Walls that meet in points.

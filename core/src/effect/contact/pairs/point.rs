@@ -22,7 +22,7 @@ pub(super) struct PairPoint<'a> {
     pub(super) pair: ListedPair,
     pub(super) candidate: PairCandidate,
     /// The points of its meeting in memory that it was
-    pub(super) predecessors: Predecessors,
+    predecessors: Predecessors,
     /// The number of the first point of its meeting in memory
     first_known: usize,
     /// The memory of the point that it was
@@ -33,7 +33,7 @@ pub(super) struct PairPoint<'a> {
     /// Normal and traction in the axes of the carrier
     pub(super) state: PointState,
     /// The rotation of the carrier
-    pub carrier: Mat3,
+    carrier: Mat3,
     /// The place on the centre line of the first beam
     place: Vec3,
     /// The number of nodes to both sides, and their shape functions
