@@ -32,7 +32,9 @@ const DIVERGED_CORRECTION: f64 = 1e6;
 
 impl Newton {
     /// Solves for the balance of both stages of a step. Afterwards the forces of the system are
-    /// those of the end.
+    /// those of the end; those of the middle are shown to `pass` where it is in balance, the last
+    /// time for the middle that is found.
+    #[expect(clippy::too_many_arguments, reason = "both stages of a step, and who sees them")]
     pub fn solve_stages(
         &mut self,
         model: &Model,
@@ -41,12 +43,13 @@ impl Newton {
         end: &mut State,
         step: &Lobatto,
         work: &mut Work,
+        pass: &mut dyn FnMut(&State, &Assembly),
     ) -> Result<(), NewtonFailure> {
         self.begin_anew();
         assembly.forget();
         let round_off = assembly.round_off(end);
         let solution =
-            Stages { newton: self, model, assembly, middle, end, step, work, round_off, history: Vec::new() };
+            Stages { newton: self, model, assembly, middle, end, step, work, pass, round_off, history: Vec::new() };
         let found = solution.find();
         // Whatever it ended with, an interrupted solution is none.
         NewtonFailure::unless_interrupted().and(found)
@@ -62,6 +65,8 @@ struct Stages<'s> {
     end: &'s mut State,
     step: &'s Lobatto,
     work: &'s mut Work,
+    /// Sees the middle in balance
+    pass: &'s mut dyn FnMut(&State, &Assembly),
     round_off: RoundOff,
     /// Largest residual of the end in each round, relative to its tolerance
     history: Vec<f64>,
@@ -83,6 +88,9 @@ impl Stages<'_> {
             }
             let Judgement { verdict, residual } = self.evaluate(Stage::Middle, false, last_of_middle)?;
             is_middle_balanced = verdict != Verdict::Continue || residual.ratio <= MIDDLE_ALLOWANCE;
+            if is_middle_balanced {
+                (self.pass)(self.middle, self.assembly);
+            }
             last_of_middle = Some(self.correct(Stage::Middle, round, false, residual)?);
         }
         let Judgement { residual, .. } = self.evaluate(Stage::End, false, last)?;

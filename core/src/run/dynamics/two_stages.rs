@@ -3,15 +3,19 @@
 use super::Dynamics;
 use super::middle::Middle;
 use crate::integrate::{Lobatto, MIDDLE, Stage};
+use crate::model::Assembly;
+use crate::run::energy::Entry;
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
 use crate::solve::NewtonFailure;
+use crate::system::State;
 
 impl Dynamics<'_, '_> {
     /// Predicts both stages of a step, puts prescribed directions where they belong, and finds the
     /// balance of both.
     pub(super) fn find_stages(&mut self, middle: &mut Middle, length: f64, next: f64) -> Result<(), NewtonFailure> {
-        let StageRun { assembly, newton, state, model, schedule, counters, .. } = &mut *self.stage;
+        let StageRun { assembly, newton, state, model, schedule, counters, bookkeeper, keeps_account, .. } =
+            &mut *self.stage;
         let step = Lobatto { length };
         let Middle { state: middle, predictor } = middle;
         if !self.rateless.is_empty() {
@@ -35,7 +39,12 @@ impl Dynamics<'_, '_> {
                 return Err(too_far.into());
             }
         }
-        newton.solve_stages(model, assembly, middle, state, &step, &mut counters.work)?;
+        let pass = &mut |middle: &State, assembly: &Assembly| {
+            if *keeps_account {
+                bookkeeper.pass_middle(Entry::new(model, middle, assembly));
+            }
+        };
+        newton.solve_stages(model, assembly, middle, state, &step, &mut counters.work, pass)?;
         let dof_map = &assembly.system.pattern.dof_map;
         predictor.end(dof_map, middle, length);
         self.predictor.end(dof_map, state, length);

@@ -8,6 +8,7 @@ use crate::system::{Category, DofMap, Slot, State, System};
 use crate::tensor::{Vec3, zeros};
 use crate::threads::{self, PART};
 use serde::{Deserialize, Serialize};
+use std::ops::{Mul, Sub};
 
 /// Energies of one state and the work of loads, gravity and motions so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -16,7 +17,8 @@ pub struct Ledger {
     pub kinetic: f64,
     /// Strain energy, springs included
     pub strain: f64,
-    /// Work done from outside so far, by the trapezoidal rule from row to row
+    /// Work done from outside so far: by the trapezoidal rule from state to state, by Simpson's where
+    /// steps have a stage in their middle
     pub external: f64,
     /// Energy taken by damping so far
     pub damped: f64,
@@ -75,9 +77,33 @@ pub struct Bookkeeper {
     force: Vec<Vec3>,
     drag: Vec<Vec3>,
     drives: Vec<(f64, f64)>,
+    /// The middle of the step that is booked next
+    #[serde(skip)]
+    middle: Waypoint,
+}
+
+/// The middle of a step, through which work is integrated where a scheme has a stage there.
+#[derive(Clone, Debug, Default)]
+struct Waypoint {
+    is_passed: bool,
+    q: Vec<Vec3>,
+    force: Vec<Vec3>,
+    drag: Vec<Vec3>,
+    drives: Vec<(f64, f64)>,
 }
 
 impl Bookkeeper {
+    /// Notes the middle of the step that is booked next.
+    pub fn pass_middle(&mut self, entry: Entry) {
+        let Entry { state, system, .. } = entry;
+        let Waypoint { is_passed, q, force, drag, drives } = &mut self.middle;
+        *is_passed = true;
+        threads::copy(q, &state.q);
+        copy_outside(system, state.q.len(), force);
+        threads::copy(drag, &system.force[Category::Damping as usize]);
+        *drives = entry.drives();
+    }
+
     /// Initial motions have set a scene in motion, in a stage that is opened next: the kinetic
     /// energy that is new belongs to the account.
     pub fn bring_in(&mut self, entry: Entry) {
@@ -95,12 +121,8 @@ impl Bookkeeper {
     pub fn open(&mut self, entry: Entry) {
         let Entry { state, system, .. } = entry;
         self.drives = entry.drives();
-        self.force = zeros(state.q.len());
-        threads::each_part(&mut self.force, |start, part| {
-            for (slot, force) in (start..).zip(part) {
-                put(force, outside(system, slot));
-            }
-        });
+        copy_outside(system, state.q.len(), &mut self.force);
+        self.middle.is_passed = false;
         // Where nothing damps it is empty.
         threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
         self.take(entry);
@@ -110,14 +132,24 @@ impl Bookkeeper {
     /// Adds the work of the step that ends here.
     pub fn add_step(&mut self, entry: Entry) {
         let Entry { model, state, system, linear } = entry;
-        let Self { ledger, q, unwrapped, force, drag, .. } = self;
+        let Self { ledger, q, unwrapped, force, drag, middle, .. } = self;
+        let through = std::mem::take(&mut middle.is_passed).then_some(&*middle);
         let (from, to) = ((&q[..], &unwrapped[..]), (&state.q[..], &state.unwrapped[..]));
-        let way = Way { kinds: &model.kinds, from, to, is_linear: linear.is_some() };
-        ledger.external += way.work(force, |slot| outside(system, slot));
-        ledger.damped += way.work(drag, |slot| system.part_of(Category::Damping, slot));
+        let middle = through.map(|middle| &middle.q[..]);
+        let way = Way { kinds: &model.kinds, from, middle, to, is_linear: linear.is_some() };
+        ledger.external += way.work(force, through.map(|middle| &middle.force[..]), |slot| outside(system, slot));
+        ledger.damped +=
+            way.work(drag, through.map(|middle| &middle.drag[..]), |slot| system.part_of(Category::Damping, slot));
         let drives = entry.drives();
-        for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {
-            ledger.external += 0.5 * (f0 + f1) * (x1 - x0);
+        for (k, (&(x0, f0), &(x1, f1))) in self.drives.iter().zip(&drives).enumerate() {
+            ledger.external += match through {
+                None => 0.5 * (f0 + f1) * (x1 - x0),
+                Some(middle) => {
+                    let (x, f) = middle.drives[k];
+                    let [before, within, after] = slopes(x - x0, x1 - x0);
+                    (f0 * before + 4.0 * f * within + f1 * after) / 6.0
+                }
+            };
         }
         self.drives = drives;
         self.take(entry);
@@ -178,25 +210,33 @@ impl Bookkeeper {
 struct Way<'a> {
     kinds: &'a [SlotKind],
     from: (&'a [Vec3], &'a [Vec3]),
+    /// The unknowns in the middle, in the charts of the end, if they are known
+    middle: Option<&'a [Vec3]>,
     to: (&'a [Vec3], &'a [Vec3]),
     /// True if forces are conjugate to the unknowns themselves, rotation vectors included
     is_linear: bool,
 }
 
 impl Way<'_> {
-    /// The work of forces, which are `after` where it ends and take the place of those `before`.
-    fn work(&self, before: &mut [Vec3], after: impl Fn(usize) -> Vec3 + Send + Sync) -> f64 {
+    /// The work of forces, which are `within` in the middle, and `after` where it ends; these take the
+    /// place of those `before`. Forces that are always zero may be left out.
+    fn work(&self, before: &mut [Vec3], within: Option<&[Vec3]>, after: impl Fn(usize) -> Vec3 + Send + Sync) -> f64 {
         let ((q0, wound0), (q1, wound1)) = (self.from, self.to);
         let of_part = |(number, before): (usize, &mut [Vec3])| {
             let mut sum = 0.0;
             for (slot, before) in (PART * number..).zip(before) {
                 let after = after(slot);
                 let before = put(before, after);
+                let within = self.middle.zip(within).map(|(q, force)| (q[slot], force[slot]));
+                if [before, after, within.map_or(Vec3::ZERO, |(_, force)| force)] == [Vec3::ZERO; 3] {
+                    continue;
+                }
                 let unwrapped = *wound1.get(slot).unwrap_or(&q1[slot]) - *wound0.get(slot).unwrap_or(&q0[slot]);
-                let kind = self.kinds[slot];
-                sum += match self.is_linear && !kind.is_multiplier() {
-                    true => straight_work(q0[slot], before, q1[slot], after),
-                    false => work(kind, (q0[slot], before), (q1[slot], after), unwrapped),
+                let (from, to) = ((q0[slot], before), (q1[slot], after));
+                sum += match self.kinds[slot] {
+                    SlotKind::Force | SlotKind::Moment => 0.0,
+                    SlotKind::Rotation if !self.is_linear => turning_work(from, within, to, unwrapped),
+                    SlotKind::Displacement | SlotKind::Sliding | SlotKind::Rotation => straight_work(from, within, to),
                 };
             }
             sum
@@ -205,6 +245,18 @@ impl Way<'_> {
         threads::in_order(before.chunks_mut(PART).enumerate(), of_part, |part: f64| sum += part);
         sum
     }
+}
+
+/// Copies the forces from outside at all slots.
+fn copy_outside(system: &System, slots: usize, to: &mut Vec<Vec3>) {
+    if to.len() != slots {
+        *to = zeros(slots);
+    }
+    threads::each_part(to, |start, part| {
+        for (slot, force) in (start..).zip(part) {
+            put(force, outside(system, slot));
+        }
+    });
 }
 
 /// Puts a force in the place of another one, which it gives back. Most are zero and stay so, in
@@ -229,30 +281,38 @@ fn outside(system: &System, slot: usize) -> Vec3 {
     }
 }
 
-/// Work of a force over the way from the one place to the other, by the trapezoidal rule. A
-/// rotation tells by `unwrapped` how far it has gone.
-fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3), unwrapped: Vec3) -> f64 {
-    if f0 == Vec3::ZERO && f1 == Vec3::ZERO {
-        return 0.0;
-    }
-    match kind {
-        SlotKind::Displacement | SlotKind::Sliding => straight_work(q0, f0, q1, f1),
-        SlotKind::Rotation => turning_work(q0, f0, q1, f1, unwrapped),
-        SlotKind::Force | SlotKind::Moment => 0.0,
-    }
+/// The rates at the start, in the middle and at the end of what goes to `middle` and to `end`, over
+/// the length of the step: those of the parabola.
+fn slopes<T>(middle: T, end: T) -> [T; 3]
+where
+    T: Copy + Sub<Output = T> + Mul<f64, Output = T>,
+{
+    [middle * 4.0 - end, end, end * 3.0 - middle * 4.0]
 }
 
-/// Work of a force over the straight way of its unknown.
-fn straight_work(q0: Vec3, f0: Vec3, q1: Vec3, f1: Vec3) -> f64 {
-    0.5 * (f0 + f1).dot(q1 - q0)
+/// Work of a force over the straight way of its unknown: by the trapezoidal rule, or by Simpson's
+/// where the middle is known.
+fn straight_work((q0, f0): (Vec3, Vec3), middle: Option<(Vec3, Vec3)>, (q1, f1): (Vec3, Vec3)) -> f64 {
+    let Some((q, f)) = middle else { return 0.5 * (f0 + f1).dot(q1 - q0) };
+    let [before, within, after] = slopes(q - q0, q1 - q0);
+    (f0.dot(before) + 4.0 * f.dot(within) + f1.dot(after)) / 6.0
 }
 
 /// Work of a moment over a rotation, in a form that no change of chart disturbs: with the spatial
-/// moment m = T^-1 f and the spatial rotation vector from the one state to the other.
-fn turning_work(p0: Vec3, f0: Vec3, p1: Vec3, f1: Vec3, unwrapped: Vec3) -> f64 {
-    let (before, after) = (Rotation::new(p0), Rotation::new(p1));
-    let shortest = log(after.r * before.r.transpose());
+/// moment m = T^-1 f and the spatial rotation vector theta from the one state to the other. Where
+/// the middle is known, by Simpson's rule with the spatial spin T(theta)^T dtheta/dt. `unwrapped`
+/// tells how far the rotation has gone.
+fn turning_work((p0, f0): (Vec3, Vec3), middle: Option<(Vec3, Vec3)>, (p1, f1): (Vec3, Vec3), unwrapped: Vec3) -> f64 {
+    let [before, after] = [p0, p1].map(Rotation::new);
+    let since = |rotation: &Rotation| log(rotation.r * before.r.transpose());
+    let shortest = since(&after);
     let turned = if unwrapped.norm() > HALF_TURN { unwound(shortest, unwrapped) } else { shortest };
-    let (m0, m1) = (before.t_inverse() * f0, after.t_inverse() * f1);
-    0.5 * (m0 + m1).dot(turned)
+    let [m0, m1] = [before.t_inverse() * f0, after.t_inverse() * f1];
+    let Some((p, f)) = middle else { return 0.5 * (m0 + m1).dot(turned) };
+    let within = Rotation::new(p);
+    let m = within.t_inverse() * f;
+    let halfway = since(&within);
+    let [at_start, at_middle, at_end] = slopes(halfway, turned);
+    let power = |theta: Vec3, moment: Vec3, rate: Vec3| (Rotation::new(theta).t * moment).dot(rate);
+    (m0.dot(at_start) + 4.0 * power(halfway, m, at_middle) + power(turned, m1, at_end)) / 6.0
 }
