@@ -1,7 +1,7 @@
 //! Contact with surfaces in whole scenes.
 
 use crate::random::Random;
-use crate::scenes::{attempt, refusal, simulate};
+use crate::scenes::{attempt, list, refusal, simulate};
 use beamsim_core::failure::FailureKind;
 use beamsim_core::tensor::Vec3;
 use beamsim_core::warning::WarningKind;
@@ -1140,4 +1140,69 @@ fn a_step_that_takes_more_energy_than_there_is_is_told() {
     let deck = scene.deck();
     assert!(!told(&deck));
     assert!(told(&deck.replace("kind = \"static\"", "kind = \"static\"\nadaptive = false")));
+}
+
+/// What sticks to a surface follows it, however stiff the contact is: a ball that does not turn, held by a spring, on a
+/// floor that moves aside. It slides where the spring takes more than friction gives.
+#[test]
+fn floors_that_move_carry_what_sticks_to_them() {
+    let mut random = Random::new(71);
+    for case in 0..40 {
+        let radius = 10f64.powf(random.range(-3.0, 1.0));
+        let mass = 10f64.powf(random.range(-2.0, 2.0));
+        let weight = 9.81 * mass;
+        let stiffness = 10f64.powf(random.range(3.0, 6.0)) * weight / radius;
+        let friction = random.range(0.1, 1.0);
+        let spring = weight / radius * 10f64.powf(random.range(-1.0, 1.0));
+        let way = radius * random.range(0.05, 0.8);
+        let steps = [1, 3, 10][case % 3];
+        let text = format!(
+            "gravity = [0, 0, -9.81]\n[point]\nc = [0, 0, {radius}]\n[[body]]\nat = \"c\"\nmass = {mass}\n\
+             [[support]]\nat = \"c\"\nfix = [\"uy\", \"rx\", \"ry\", \"rz\"]\n\
+             [[spring]]\nat = \"c\"\nstiffness = [{spring}, 0, 0, 0, 0, 0]\n\
+             [[surface]]\nname = \"floor\"\nkind = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n\
+             move = [{way}, 0, 0]\nstages = [2]\n\
+             [[contact]]\nname = \"k\"\nnodes = [\"c\"]\nsurfaces = [\"floor\"]\nradius = {radius}\n\
+             friction = {friction}\nstiffness = {stiffness}\n[[stage]]\nkind = \"static\"\nsteps = 1\n\
+             [[stage]]\nkind = \"static\"\nsteps = {steps}\n[output]\ncolumns = [\"u\"]\n"
+        );
+        let simulation = simulate(&text);
+        let exact = way.min(friction * weight / spring);
+        let off = (simulation.end("c.ux") - exact).abs();
+        // Elastic stick gives way by the force over its stiffness, which is at least that of the contact.
+        let given = friction * weight / stiffness;
+        assert!(off <= 1e-6 * exact + given, "{case}: {} for {exact}\n{text}", simulation.end("c.ux"));
+        assert_eq!(simulation.counters.cutbacks, 0, "{case}\n{text}");
+    }
+}
+
+/// Points on the centre line have no way out of their own, wherever along the tube they are.
+#[test]
+fn wires_on_the_axis_of_straight_tubes_touch_nothing() {
+    let mut random = Random::new(72);
+    for case in 0..60 {
+        let (along, middle) = (random.direction(), random.cube(3.0));
+        let (half, radius) = (random.range(0.2, 3.0), random.range(0.02, 0.1));
+        let count = 2 + case % 3;
+        let point = |k: usize| list(middle + along * (half * (2.0 * k as f64 / (count - 1) as f64 - 1.0)));
+        let through: Vec<String> = (0..count).map(point).collect();
+        let end = middle + along * (half * 0.7);
+        let text = format!(
+            "[point]\nA = {}\nB = {}\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1\nEI = 1\n\
+             [[beam]]\nname = \"w\"\nsection = \"s\"\nthrough = [\"A\", \"B\"]\nelements = 4\n\
+             [[support]]\nat = \"A\"\nfix = \"all\"\n[[load]]\nat = \"B\"\nforce = {}\n\
+             [[surface]]\nname = \"v\"\nkind = \"tube\"\nthrough = [{}]\nradius = {radius}\nside = \"inside\"\n\
+             [[contact]]\nname = \"k\"\nbeams = [\"w\"]\nsurfaces = [\"v\"]\nradius = {}\n\
+             [[stage]]\nkind = \"static\"\nsteps = 2\n[output]\nnodes = [\"B\"]\ncolumns = [\"u\", \"contact\"]\n",
+            list(middle),
+            list(end),
+            list(along),
+            through.join(", "),
+            0.2 * radius
+        );
+        let simulation = simulate(&text);
+        let moved = Vec3(simulation.vector("B.u"));
+        let exact = along * (0.7 * half / 1e4);
+        assert!((moved - exact).norm() < 1e-9 * half, "{case}: {moved:?}\n{text}");
+    }
 }

@@ -272,7 +272,7 @@ impl Solution<'_> {
     fn decide(&mut self, verdict: Verdict, residual: Residual, forms: bool) -> Result<Decision, NewtonFailure> {
         let is_last = self.iterations >= self.newton.max_iterations;
         match verdict {
-            Verdict::Converged if self.prescribed_increment.is_none() => {
+            Verdict::Converged if self.prescribed_increment.is_none() && !self.state.contacts.holds_on => {
                 if residual.ratio > 0.0 {
                     self.polish(forms);
                 }
@@ -451,6 +451,7 @@ impl Solution<'_> {
             charts::carry(self.state, dq, &self.charted.rotations);
         }
         self.method.correct(self.state, dq);
+        self.state.contacts.holds_on = false;
     }
 
     /// Failure of the iteration; if round-off has taken most of the softest stiffness, the linear

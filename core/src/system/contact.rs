@@ -36,6 +36,8 @@ pub struct ContactMemory {
     pub(crate) resists: bool,
     /// True if points that slid go on sliding in the first tangent of a level
     pub(crate) goes_on: bool,
+    /// True before the first correction of a level, in which points that stuck go on sticking
+    pub(crate) holds_on: bool,
     /// Energy that friction and damping of contacts have taken since the start of the run
     pub(crate) dissipated: f64,
     /// Energy per time that the damping of contacts takes
@@ -64,6 +66,7 @@ impl Default for ContactMemory {
             stick_part: 1.0,
             resists: false,
             goes_on: true,
+            holds_on: false,
             dissipated: 0.0,
             damping_power: 0.0,
             deepest: 0.0,

@@ -68,6 +68,7 @@ impl ContactLaws {
             stiffness: self.stick_stiffness(number, stiffness, contacts),
             resistance: if contacts.resists { stiffness.augmented } else { 0.0 },
             goes_on: contacts.goes_on,
+            holds_on: contacts.holds_on,
         })
     }
 

@@ -44,6 +44,10 @@ pub struct FrictionLaw {
     /// a step. Otherwise all points would stick there, and a rope that is pulled over a drum would be
     /// torn apart by each first correction.
     pub(crate) goes_on: bool,
+    /// True if a contact that stuck has no limit, as before the first correction of a level: a surface
+    /// may have moved far, and what sticks to it has yet to follow. With the tangent of sliding it never
+    /// would.
+    pub(crate) holds_on: bool,
 }
 
 /// The traction of a contact at the last converged state. A contact that was open has none.
@@ -181,7 +185,8 @@ impl FrictionLaw {
         let size = trial.force.norm();
         let is_tied = size.largest() > 0.0 && size.largest() >= AT_LIMIT * limit.largest();
         let goes_on = self.goes_on && carried.slides && is_tied;
-        if size.largest() <= limit.largest() && !goes_on {
+        let holds_on = self.holds_on && !carried.slides && carried.normal != Vec3::ZERO;
+        if holds_on || (size.largest() <= limit.largest() && !goes_on) {
             return Traction { status: Status::Sticks, ..trial };
         }
         let inverse = T::one() / size;
@@ -242,6 +247,7 @@ mod tests {
             stiffness: random.between(0.5, 5.0),
             resistance: 0.0,
             goes_on: false,
+            holds_on: false,
         }
     }
 
@@ -349,7 +355,8 @@ mod tests {
         for _ in 0..300 {
             let carried = random_traction(&mut random);
             let n = (carried.normal + random.vector(0.5)).normalized().unwrap();
-            let law = FrictionLaw { coefficient: 1.0, stiffness: 1.0, resistance: 0.0, goes_on: false };
+            let law =
+                FrictionLaw { coefficient: 1.0, stiffness: 1.0, resistance: 0.0, goes_on: false, holds_on: false };
             let traction = law.traction(&carried, n, 1e3, Vec3::ZERO);
             assert_eq!(traction.status, Status::Sticks);
             assert!((traction.force.norm() - carried.force.norm()).abs() < 1e-15);

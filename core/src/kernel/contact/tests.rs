@@ -298,6 +298,7 @@ fn set_friction<const N: usize>(random: &mut Random, scene: &mut Scene<N>, norma
         stiffness: random.between(0.5, 3.0),
         resistance: 0.0,
         goes_on: false,
+        holds_on: false,
     });
 }
 
@@ -508,7 +509,8 @@ fn at_rest(random: &mut Random, surface: &Surface) -> Scene<3> {
         let body = |i: usize| &scene.bodies[i];
         scene.before =
             from_fn(|i| NodeBefore::of(body(i).place(), body(i).rotation().r, carrier.place, &carrier.rotation.r));
-        scene.law.friction = Some(FrictionLaw { coefficient: 50.0, stiffness: 2.0, resistance: 0.0, goes_on: false });
+        scene.law.friction =
+            Some(FrictionLaw { coefficient: 50.0, stiffness: 2.0, resistance: 0.0, goes_on: false, holds_on: false });
         let (_, state) = scene.now(Weights::NONE);
         let n0 = state.normal;
         let free = random.vector(0.3);
@@ -550,7 +552,13 @@ fn balls_that_roll_do_not_slide() {
         law: ContactLaw {
             radius,
             normal: NormalLaw::Penalty { stiffness: 100.0, damping: 0.0, offset: 0.0 },
-            friction: Some(FrictionLaw { coefficient: 0.5, stiffness: 10.0, resistance: 0.0, goes_on: false }),
+            friction: Some(FrictionLaw {
+                coefficient: 0.5,
+                stiffness: 10.0,
+                resistance: 0.0,
+                goes_on: false,
+                holds_on: false,
+            }),
             carried: CarriedTraction::default(),
             place: Place::Fixed,
             weight: 1.0,

@@ -130,6 +130,8 @@ impl Piece {
         };
         offer(1.0);
         let slopes = |u: f64| self.slopes(y, u).map(|[first, second]| Slopes { first, second });
+        // A point of the centre line has no slope there, and may lie where two intervals meet.
+        (1..INTERVALS).map(|k| k as f64 / INTERVALS as f64).filter(|&u| slopes(u).is_none()).for_each(&mut offer);
         interior_minima(INTERVALS, &slopes, &mut offer);
         best
     }

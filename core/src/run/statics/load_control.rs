@@ -49,6 +49,7 @@ impl StageRun<'_> {
         let moves = self.set_load(load)?;
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
         let moved = moves.then_some(&prescribed_increment[..]);
+        state.contacts.holds_on = model.contacts().is_some() && !state.contacts.is_clear;
         newton.solve(model, assembly, state, &Equilibrium, moved, &mut counters.work)?;
         self.refuse_far_steps()
     }
