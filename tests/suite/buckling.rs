@@ -109,3 +109,32 @@ fn loads_of_a_heated_column_are_branches_in_all_directions() {
         assert!(found.iter().all(|critical| critical.kind == CriticalKind::Branch), "{found:?}");
     }
 }
+
+/// Where a static stage ends early and the next one applies the rest, all of the load is scaled.
+#[test]
+fn loads_after_an_early_end_are_scaled_as_a_whole() {
+    let column = |stages: &str| {
+        format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e5\nGA = 1e6\nGJ = 1\nEI = [1, 2]\n\
+             [[beam]]\nname = \"col\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 10\norder = 2\n\
+             [[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\"]\n[[support]]\nat = \"b\"\nfix = [\"uy\", \"uz\"]\n\
+             [[load]]\nat = \"b\"\nforce = [-5, 0, 0]\n{stages}[[stage]]\nkind = \"buckling\"\nmodes = 1\n"
+        )
+    };
+    let until = |part: f64| {
+        format!(
+            "[[stage]]\nkind = \"static\"\nsteps = 20\nuntil = {{ column = \"a.fx\", above = {} }}\n",
+            5.0 * part - 0.1
+        )
+    };
+    let rest = "[[stage]]\nkind = \"static\"\nsteps = 2\n";
+    let first = |stages: &str| critical_loads(&column(stages))[0].load;
+    let whole = first(rest);
+    assert!((whole / (std::f64::consts::PI.powi(2) / 5.0) - 1.0).abs() < 2e-3, "{whole}");
+    for part in [0.05, 0.25, 0.7, 0.9] {
+        for stages in [until(part), until(part) + rest, until(part) + rest + rest] {
+            let load = first(&stages);
+            assert!((load / whole - 1.0).abs() < 1e-6, "{part}: {load}, not {whole}\n{stages}");
+        }
+    }
+}

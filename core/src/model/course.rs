@@ -160,6 +160,8 @@ pub struct Progress {
     has_acted: bool,
     /// The last ramp that went anywhere
     last_ramp: Option<Ramp>,
+    /// Where that ramp began, with those that it goes on with after an early end of their stages
+    origin: f64,
     clock: HistoryClock,
 }
 
@@ -187,7 +189,9 @@ impl Progress {
         self.has_acted |= acts && start.kind != StageKind::Modal;
         let comes_at_once = acts && start.kind == StageKind::Dynamic && amplitude.entry == Entry::Load;
         if let Course::Ramp(ramp) = self.course {
-            self.last_ramp = if ramp.grows() { Some(ramp) } else { self.last_ramp };
+            if ramp.grows() {
+                self.note_ramp(ramp);
+            }
         } else if let Goal::Value(to) = amplitude.goal(start.number)
             && comes_at_once
         {
@@ -205,7 +209,7 @@ impl Progress {
             (_, StageKind::Buckling, goal) => match goal {
                 Goal::Value(factor) if start.fresh && self.is_fresh(amplitude, start.number) => ramp(factor),
                 Goal::Value(_) | Goal::History | Goal::Stay if start.fresh => stay,
-                Goal::Value(_) | Goal::History | Goal::Stay => self.last_ramp.map_or(stay, Course::Ramp),
+                Goal::Value(_) | Goal::History | Goal::Stay => self.whole_ramp().map_or(stay, Course::Ramp),
             },
             (_, StageKind::Static | StageKind::Dynamic, Goal::History) => Course::History(start.kind),
             (_, StageKind::Static, Goal::Value(factor)) => ramp(factor),
@@ -216,6 +220,20 @@ impl Progress {
             (Entry::Motion, StageKind::Dynamic, Goal::Value(_)) if self.has_acted => stay,
             (_, StageKind::Dynamic, Goal::Value(factor)) => Course::Hold(amplitude.full * factor),
         }
+    }
+
+    /// Takes a ramp that goes somewhere: it may go on where one has ended early.
+    fn note_ramp(&mut self, ramp: Ramp) {
+        let done = (ramp.from - self.origin) / (ramp.to - self.origin);
+        let goes_on = self.last_ramp.is_some_and(|last| last.to == ramp.to) && 0.0 < done && done < 1.0;
+        self.origin = if goes_on { self.origin } else { ramp.from };
+        self.last_ramp = Some(ramp);
+    }
+
+    /// The last ramp; from where all of it began, if it has reached its end.
+    fn whole_ramp(&self) -> Option<Ramp> {
+        let last = self.last_ramp?;
+        Some(if self.reached == last.to { Ramp { from: self.origin, ..last } } else { last })
     }
 
     fn course_absent(&self, amplitude: &Amplitude, kind: StageKind) -> Course {

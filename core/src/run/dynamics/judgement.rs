@@ -35,6 +35,9 @@ impl Dynamics<'_, '_> {
     pub(super) fn warn_of_imbalance(&mut self) {
         let Some(guard) = &self.guard else { return };
         let Some(Imbalance { share, is_own }) = guard.imbalance(self.stage.bookkeeper.scale()) else { return };
+        if self.stage.bookkeeper.scale() <= self.round_off_energy() {
+            return;
+        }
         let is_told = std::mem::replace(&mut self.stage.issued.unbalanced, true);
         if !is_own && is_told {
             return;
@@ -50,8 +53,8 @@ impl Dynamics<'_, '_> {
                 "what acts changes at once between stages: supports that catch what moves, springs that are added or \
                  removed under load"
             } else {
-                "the work of earlier stages is integrated by the trapezoidal rule between load levels (use more \
-                 `steps` there)"
+                "the work of earlier static stages is integrated by the trapezoidal rule between load levels (use more \
+                 `steps` there), or springs and supports changed under load between stages"
             };
             let message = format!(
                 "stage {stage}: energy.total is off by {percent:.0} % of the largest energy, mostly because {why}"

@@ -31,6 +31,9 @@ const SMALLEST_PART: f64 = 1.0 / 64.0;
 /// Attempts at a step with more pairs of beams near each other, at most.
 const MOST_LISTS: usize = 4;
 
+/// What places are rounded by on the way through Newton's method, in lengths of the scene and radians.
+const ROUNDED: f64 = 1e-12;
+
 /// Strains that Newton may leave where an iteration ends.
 const TOLERATED_STRAIN: f64 = 1e-9;
 
@@ -437,7 +440,22 @@ impl Dynamics<'_, '_> {
         let Some(guard) = &mut self.guard else { return Ok(()) };
         let moved = self.stage.model.farthest(self.stage.good, self.stage.state);
         let Some(Growth { grown, largest }) = guard.judge(self.stage.bookkeeper.ledger(), moved) else { return Ok(()) };
+        if largest <= self.round_off_energy() {
+            return Ok(());
+        }
         Err(Failure::EnergyGrowth { at: self.stage.moment(), grown, largest })
+    }
+
+    /// The energy of moving by what places are rounded by, in a step.
+    fn round_off_energy(&self) -> f64 {
+        let StageRun { assembly, model, .. } = &*self.stage;
+        let system = &assembly.system;
+        let scales = model.scales(&system.pattern.dof_map);
+        let mut stiffest = 0.0_f64;
+        system.pattern.each_diagonal(|equation, place| {
+            stiffest = stiffest.max(system.values[place].abs() * scales[equation].powi(2));
+        });
+        stiffest * ROUNDED.powi(2)
     }
 
     /// Names the failure and goes back to the last good state.
