@@ -7,7 +7,7 @@ use super::thread_count::threads_of;
 use super::verdict::Verdict;
 use super::{console, json, load, outputs, signals};
 use crate::deck::{self, Severity, Unreadable};
-use crate::output::{Film, OutputError, OutputKind, Record, Report};
+use crate::output::{Film, OutputError, OutputKind, Record, Report, filmed_rows, read_history};
 use crate::scene::{self, Scene};
 use std::cell::RefCell;
 use std::fs;
@@ -43,7 +43,9 @@ fn one(folder: &Path, out: Option<&Path>) -> Result<(), CommandError> {
     let scene = scene::from_text(&text).map(|(scene, _)| scene).map_err(|_| unreadable(folder))?;
     let name = fs::canonicalize(folder).ok().map_or("results".into(), |path| load::folder_name(&path));
     // The history holds only the requested nodes; the shapes come from another run of the deck.
-    let film = filmed(&scene, &name)?;
+    let film = Film::of(&scene);
+    let film = if record.is_interrupted() { film.until(filmed_rows(&read_history(folder)?, &record)) } else { film };
+    let film = filmed(&scene, &name, film)?;
     write(&scene, &name, &record, film, folder, &path)
 }
 
@@ -77,8 +79,8 @@ fn with_tables(text: &str, record: &Record, folder: &Path) -> Result<String, Com
     }
 }
 
-fn filmed(scene: &Scene, name: &str) -> Result<Film, CommandError> {
-    let extras = RunExtras { film: Some(Film::of(scene)), ..RunExtras::default() };
+fn filmed(scene: &Scene, name: &str, film: Film) -> Result<Film, CommandError> {
+    let extras = RunExtras { film: Some(film), ..RunExtras::default() };
     let finished = simulate(scene, name, None, None, extras, threads_of(scene, None));
     if let Some(signal) = signals::caught() {
         let message = "stopped before the report was written".into();
@@ -97,7 +99,13 @@ pub fn write(
     path: &Path,
 ) -> Result<(), CommandError> {
     let title = scene.title.as_deref().unwrap_or(name);
-    Report { title, record }.write(results, film, path)?;
+    if !(Report { title, record }.write(results, film, path)?) {
+        console::note(&format!(
+            "warning: {}: without shapes, since the deck run again does not pass through the rows of the history: the run was \
+             resumed with other steps or rows. Run the deck again with --report",
+            path.display()
+        ));
+    }
     console::line(&format!("  {}", path.display()));
     json::wrote("report", path);
     Ok(())

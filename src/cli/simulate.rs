@@ -334,7 +334,12 @@ impl Observer for Watcher<'_> {
         let row = self.write(snapshot.moment(), &values);
         self.values = values;
         let row = row?;
-        self.film.iter_mut().for_each(|film| film.row(snapshot, row));
+        if let Some(film) = &mut self.film {
+            film.row(snapshot, row);
+            if film.is_complete() {
+                return Err(Failure::Io("all rows that were asked for are recorded".into()));
+            }
+        }
         if let Some(results) = &mut self.results {
             results.envelope.iter_mut().for_each(|envelope| envelope.row(snapshot));
             results.profile.iter_mut().for_each(|profile| profile.row(snapshot));

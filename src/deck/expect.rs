@@ -1,6 +1,6 @@
 //! `[[expect]]`: numbers, failures and warnings that a run is compared with.
 
-use super::diagnostic::{Diagnostic, Span, Spanned, one_of};
+use super::diagnostic::{Diagnostic, Spanned, one_of};
 use super::hints::{self, nearest};
 use super::reader::{Context, Item, Table, kind_of};
 use super::words::{Words, words};
@@ -15,8 +15,6 @@ pub struct Expect {
     pub(crate) body: ExpectBody,
     /// Origin of the number
     pub(crate) source: Option<String>,
-    /// Place of the table
-    span: Span,
 }
 
 /// Kinds of expectations.
@@ -122,7 +120,7 @@ pub(super) fn read_expect<'a>(context: &'a Context, item: &'a Item<'a>) -> Optio
     } else {
         read_column(&table)
     };
-    Some(Expect { body: body?, source, span: table.span.clone() })
+    Some(Expect { body: body?, source })
 }
 
 /// Reports the first key beside `own` that an expectation of a whole run has no use for.

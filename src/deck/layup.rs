@@ -1,6 +1,6 @@
 //! `[layup.NAME]`: plies of walls.
 
-use super::diagnostic::{Span, Spanned};
+use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table};
 use super::section_shape::read_angle;
 use toml::de::DeValue;
@@ -23,8 +23,6 @@ pub struct Ply {
     pub thickness: f64,
     /// Angle of the fibre from axis 1 towards the direction of the wall, rad
     pub theta: f64,
-    /// Place of the ply
-    pub(crate) span: Span,
 }
 
 /// Keys of `[layup.NAME]`.
@@ -55,5 +53,5 @@ fn read_ply(context: &Context, item: &Item) -> Option<Ply> {
             .wrong(thickness.span, format!("a ply must have a positive thickness, found {}", thickness.value));
     }
     let theta = angle.map_or(Some(0.0), |angle| read_angle(context, angle))?;
-    Some(Ply { material: material?, thickness: thickness.value, theta, span })
+    Some(Ply { material: material?, thickness: thickness.value, theta })
 }

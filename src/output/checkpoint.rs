@@ -11,7 +11,7 @@ use crate::scene::Scene;
 use beamsim_core::probe::{Followed, StageEnd};
 use beamsim_core::run::Checkpoint;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::fs;
 use std::path::Path;
 use xxhash_rust::xxh3::xxh3_64;
@@ -20,7 +20,7 @@ use xxhash_rust::xxh3::xxh3_64;
 const MAGIC: &[u8] = b"beamsim checkpoint\n";
 /// The version of the program, and that of the form of the file, which changes with any structure
 /// that is stored.
-const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " 11");
+const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " 12");
 /// The length of the checksum, in bytes
 const CHECKSUM: usize = 8;
 
@@ -135,7 +135,10 @@ fn fingerprint(scene: &Scene, first_open: usize) -> u64 {
         output.retain(|key, _| !["every", "interval"].contains(&key.as_str()));
     }
     if let Some(deck) = deck.as_object_mut() {
-        deck.retain(|key, _| !["title", "expect"].contains(&key.as_str()));
+        // A choice of rows may have brought the table.
+        let is_empty_output =
+            |key: &str, value: &Value| key == "output" && value.as_object().is_some_and(Map::is_empty);
+        deck.retain(|key, value| !["title", "expect"].contains(&key.as_str()) && !is_empty_output(key, value));
     }
     xxh3_64(format!("{deck}{meshes:?}").as_bytes())
 }

@@ -36,5 +36,5 @@ pub use record::{
     DeckSource, FileRecord, FinishedRun, ReachedAccuracy, ReachedColumn, ReachedMesh, ReachedMeshes, Record,
     RunSummary, TableRecord, TableSource, WarningRecord,
 };
-pub use report::{Film, Reel, Report};
+pub use report::{Film, Reel, Report, filmed_rows, read_history};
 pub use stress::{write_envelope, write_profile};

@@ -362,7 +362,7 @@ impl Draft<'_> {
         let layup = match plies {
             WallPlies::Thickness(thickness) => {
                 let material = self.own_material()?;
-                let ply = deck::Ply { material, thickness: *thickness, theta: 0.0, span: span.clone() };
+                let ply = deck::Ply { material, thickness: *thickness, theta: 0.0 };
                 deck::Layup { name: Spanned { value: wall.to_string(), span: span.clone() }, plies: vec![ply] }
             }
             WallPlies::Layup(name) => {

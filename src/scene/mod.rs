@@ -132,7 +132,7 @@ pub struct Expectation {
     /// Kind, with bounds
     pub(crate) kind: ExpectationKind,
     /// Origin of the number
-    source: Option<String>,
+    pub source: Option<String>,
 }
 
 /// Kinds of expectations.

@@ -854,3 +854,56 @@ fn a_subdivided_step_is_as_good_as_a_smaller_one() {
     let size = fine.vector("tip.u").iter().fold(0.0_f64, |m, u| m.max(u.abs()));
     assert!(off < 0.2 * size, "{off} of {size}");
 }
+
+/// The energy that a damper takes, and the work of a force and of a moved support, have the order of the scheme.
+#[test]
+fn work_through_the_middle_of_steps_has_order_four() {
+    let text = |step: f64| {
+        format!(
+            "[point]\nm = [0, 0, 0]\nr = [0, 3, 0]\nw = [0, 6, 0]\nv = [1, 6, 0]\n[history.push]\nexpr = \"sin(3*t)\"\n\
+             [history.turn]\nexpr = \"t^2 * (3 - t) / 4\"\n\
+             [[body]]\nat = \"m\"\nmass = 1\n[[body]]\nat = \"r\"\nmass = 1\ninertia = [0.5, 0.6, 0.7]\n\
+             [[body]]\nat = \"v\"\nmass = 2\n[[body]]\nat = \"w\"\nmass = 1\n\
+             [[support]]\nat = \"m\"\nfix = [\"uy\", \"uz\", \"rx\", \"ry\", \"rz\"]\n\
+             [[support]]\nat = \"r\"\nfix = [\"ux\", \"uy\", \"uz\"]\n\
+             [[support]]\nat = \"w\"\nfix = [\"uy\", \"uz\", \"rx\", \"ry\", \"rz\"]\n[[support]]\nat = \"v\"\nfix = [\"uy\", \"uz\", \"rx\", \"ry\", \"rz\"]\n\
+             [[spring]]\nat = \"m\"\nstiffness = [4, 0, 0, 0, 0, 0]\ndamping = [0.8, 0, 0, 0, 0, 0]\n\
+             [[spring]]\nat = \"r\"\nstiffness = [0, 0, 0, 1, 1, 2]\ndamping = [0, 0, 0, 0.2, 0.3, 0.1]\n\
+             [[spring]]\nbetween = [\"w\", \"v\"]\nstiffness = 5\n\
+             [[motion]]\nat = \"w\"\nux = 0.5\nhistory = \"turn\"\n\
+             [[load]]\nat = \"m\"\nforce = [2, 0, 0]\nhistory = \"push\"\n\
+             [[load]]\nat = \"r\"\nmoment = [1, 0.5, -0.7]\nhistory = \"push\"\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 2\nstep = {step}\nscheme = \"lobatto\"\n\
+             [output]\nnodes = [\"m\", \"r\", \"v\"]\ncolumns = [\"u\", \"energy\"]\n"
+        )
+    };
+    let ends = |step: f64| {
+        let simulation = simulate(&text(step));
+        ["energy.external", "energy.damped", "energy.total"].map(|column| simulation.end(column))
+    };
+    let [coarse, fine, exact] = [0.1, 0.05, 0.0025].map(ends);
+    for k in 0..3 {
+        let [first, second] = [coarse, fine].map(|ends| (ends[k] - exact[k]).abs());
+        assert!(first < 2e-3 && second < first / 11.0, "{k}: {first} and {second} of {exact:?}");
+    }
+    assert!(exact[0] > 0.5 && exact[1] > 0.1 && exact[2].abs() < 1e-7, "{exact:?}");
+}
+
+/// Bodies that wait at rest for their load have the energies of round-off, which may grow.
+#[test]
+fn what_waits_at_rest_for_its_load_gains_no_energy() {
+    for scheme in SCHEMES.into_iter().chain(["scheme = \"lobatto\""]) {
+        let text = format!(
+            "[point]\ntip = [0.4, 0.3, 0.2]\n[[body]]\nat = \"tip\"\nmass = 1\ninertia = [0.02, 0.02, 0.02]\n\
+             [[joint]]\nkind = \"universal\"\nnodes = [\"tip\"]\nat = [0.1, 0.17, 0.07]\naxes = [[0.8, 0.6, 0], [-0.36, 0.48, 0.8]]\n\
+             [[spring]]\nat = \"tip\"\nstiffness = [60, 40, 10, 0, 0, 0]\ndamping = [0.5, 0.6, 1.7, 0.04, 0.03, 0.02]\n\
+             [history.late]\ntimes = [0, 0.5, 0.7]\nvalues = [0, 0, 1]\n\
+             [[load]]\nat = \"tip\"\nforce = [1, 2, 3]\nhistory = \"late\"\n\
+             [[stage]]\nkind = \"dynamic\"\nend = END\nstep = 0.005\n{scheme}\n[output]\ncolumns = [\"u\", \"energy\"]\n"
+        );
+        let simulation = simulate(&text.replace("END", "1"));
+        assert!(simulation.end("energy.external") > 0.01, "{scheme}");
+        let quiet = simulate(&text.replace("END", "0.4"));
+        assert_eq!(quiet.counters.findings.warnings, [], "{scheme}");
+    }
+}

@@ -263,3 +263,46 @@ fn a_slurm_that_hangs_is_stopped() {
         assert!(!lives.success(), "{hangs} still hangs");
     }
 }
+
+/// The rows of the history that have shapes in the page of results.
+fn rows_with_shapes(folder: &Folder) -> Vec<u64> {
+    let page = fs::read_to_string(folder.0.join("r/report.html")).unwrap();
+    let (_, rest) = page.split_once("<script id=\"data\" type=\"application/json\">").unwrap();
+    let data: serde_json::Value = serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap();
+    data["scene"]["rows"].as_array().unwrap().iter().map(|row| row.as_u64().unwrap()).collect()
+}
+
+/// The shapes come from another run of the deck, which is not that of the history where a stopped run
+/// goes on with other rows.
+#[test]
+fn pages_of_stopped_and_resumed_runs_have_their_own_shapes_or_none() {
+    let folder = Folder::new("signals_report");
+    folder.write("deck.toml", &(ARM.replace("ELEMENTS", "2") + DYNAMIC));
+    let mut running = Running::start(&folder.0, &["run", "deck.toml", "--out", "r"]);
+    let has_rows = || {
+        let files = fs::read_dir(folder.0.join("r")).into_iter().flatten().flatten();
+        files.filter_map(|file| file.metadata().ok()).any(|file| file.len() > 100_000)
+    };
+    let begun = Instant::now();
+    while !has_rows() && begun.elapsed() < DEAF {
+        sleep(Duration::from_millis(20));
+    }
+    running.send(TERM);
+    assert_eq!(shown(running.end().0), 128 + TERM);
+    // It ends where the run was stopped, not after ten million steps.
+    let report = folder.beamsim(&["report", "r"]);
+    assert_eq!(status(&report), 0, "{}", last_line(&report));
+    let history = fs::read_to_string(folder.0.join("r/history.partial.csv")).unwrap();
+    let rows = history.lines().count() as u64 - 1;
+    let shown = rows_with_shapes(&folder);
+    assert!(rows > 10 && shown.len() > 5 && *shown.last().unwrap() + 10 > rows * 9 / 10, "{rows}: {shown:?}");
+    let last: f64 = history.lines().last().unwrap().split(',').nth(1).unwrap().parse().unwrap();
+    let end = format!("stage.0.end={}", (last + 5.0).ceil());
+    let resumed = ["run", "deck.toml", "--out", "r", "--resume", "--set", "output.every=7", "--set", &end];
+    let resumed = folder.beamsim(&resumed);
+    assert_eq!(status(&resumed), 0, "{}", last_line(&resumed));
+    let report = folder.beamsim(&["report", "r"]);
+    assert_eq!(status(&report), 0);
+    assert!(String::from_utf8_lossy(&report.stderr).contains("without shapes"));
+    assert_eq!(rows_with_shapes(&folder), [0; 0]);
+}

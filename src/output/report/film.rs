@@ -1,13 +1,13 @@
 //! The whole shape of a scene at the rows of its history, few enough to be carried about.
 
-use super::super::{Row, Units};
+use super::super::{HistoryReader, Row, Units};
 use super::encode::{base64, quantised};
 use crate::scene::Scene;
 use beamsim_core::effect::contact::{ContactParty, SceneSurface};
 use beamsim_core::kernel::contact::Shape;
 use beamsim_core::model::SlotKind;
 use beamsim_core::probe::{Figure, Look, Place};
-use beamsim_core::run::Snapshot;
+use beamsim_core::run::{Moment, Snapshot};
 use beamsim_core::system::{Node, State};
 use beamsim_core::tensor::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -24,6 +24,9 @@ const LEAST_FRAMES: usize = 60;
 const MOST_LOOKS_EVER: usize = 1_000_000;
 /// Events that are marked.
 const MOST_EVENTS: usize = 5000;
+
+/// Times and load factors that differ by this part of the largest are those of two moments.
+const OTHER_MOMENT: f64 = 1e-9;
 
 /// Fields below this part of the largest of their kind are round-off.
 const NOTHING: f64 = 1e-9;
@@ -80,6 +83,8 @@ pub struct Film {
     shown: Vec<Vec<usize>>,
     names: Vec<(String, usize)>,
     reel: Reel,
+    /// Rows after which it is complete, if it has an end of its own
+    rows: Option<usize>,
     supports: Vec<usize>,
     joints: Vec<usize>,
 }
@@ -112,6 +117,8 @@ struct FilmEvent {
 struct PendingFrame {
     /// Of the history
     row: usize,
+    /// When it is
+    at: Moment,
     state: State,
     /// The state about which the stage is linear
     origin: Option<State>,
@@ -121,6 +128,8 @@ struct PendingFrame {
 struct Frame {
     /// Of the history
     row: usize,
+    /// When it is
+    at: Moment,
     places: Vec<[f32; 3]>,
     turns: Vec<[i16; 4]>,
     fields: Vec<[f32; FIELD_COUNT]>,
@@ -143,6 +152,7 @@ impl Film {
             shown,
             names,
             reel: Reel { written: 0, frames: Vec::new(), stride: 1, pending: None, events: Vec::new(), before: [0; 2] },
+            rows: None,
             supports: supported(scene, &places),
             joints: parted(&places),
         }
@@ -151,6 +161,16 @@ impl Film {
     /// Of a scene whose run is resumed.
     pub fn resume(scene: &Scene, reel: Reel) -> Self {
         Self { reel, ..Self::of(scene) }
+    }
+
+    /// Ends after so many rows of the history.
+    pub fn until(self, rows: usize) -> Self {
+        Self { rows: Some(rows), ..self }
+    }
+
+    /// True once its last row is recorded.
+    pub fn is_complete(&self) -> bool {
+        self.rows.is_some_and(|rows| self.reel.written >= rows)
     }
 
     /// What was recorded so far.
@@ -164,12 +184,12 @@ impl Film {
         let due = row.wanted && self.reel.written.is_multiple_of(self.reel.stride);
         self.reel.pending = None;
         if due {
-            self.reel.frames.push(self.frame(self.reel.written, at.state, at.origin));
+            self.reel.frames.push(self.frame(self.reel.written, at.moment(), at.state, at.origin));
             self.thin();
         } else {
+            let (row, state, origin) = (self.reel.written, at.state.clone(), at.origin.cloned());
             // The last row is always written.
-            self.reel.pending =
-                Some(PendingFrame { row: self.reel.written, state: at.state.clone(), origin: at.origin.cloned() });
+            self.reel.pending = Some(PendingFrame { row, at: at.moment(), state, origin });
         }
         self.reel.written += usize::from(row.wanted);
     }
@@ -186,7 +206,7 @@ impl Film {
         self.reel.before = now;
     }
 
-    fn frame(&self, row: usize, state: &State, origin: Option<&State>) -> Frame {
+    fn frame(&self, row: usize, at: Moment, state: &State, origin: Option<&State>) -> Frame {
         let looks = self.figure.looks(state, origin);
         let stress = self.stress(&looks);
         let numbers = || self.shown.iter().flatten().copied();
@@ -194,6 +214,7 @@ impl Film {
         let contacts = &self.figure.contacts;
         Frame {
             row,
+            at,
             places: of().map(|look| look.place.0.map(|x| x as f32)).collect(),
             turns: of().map(|look| quaternion(look.axes)).collect(),
             fields: numbers().map(|k| fields(&looks[k], stress[k])).collect(),
@@ -233,15 +254,42 @@ impl Film {
         }
     }
 
-    /// Rows of the history that have a frame, after the run; the history has so many rows.
-    pub fn end(&mut self, rows: usize) -> Vec<usize> {
+    /// Ends with the run; the history without the row of an interruption has so many rows.
+    pub fn end(&mut self, rows: usize) {
         let last = self.reel.pending.take();
-        let last = last.map(|PendingFrame { row, state, origin }| self.frame(row, &state, origin.as_ref()));
+        let last = last.map(|PendingFrame { row, at, state, origin }| self.frame(row, at, &state, origin.as_ref()));
         self.reel.frames.extend(last);
         // A run that was stopped has written less than the one that was filmed for it.
         self.reel.frames.retain(|frame| frame.row < rows);
         self.reel.events.retain(|event| event.row < rows);
+    }
+
+    /// Rows of the history that have a frame.
+    pub fn frame_rows(&self) -> Vec<usize> {
         self.reel.frames.iter().map(|frame| frame.row).collect()
+    }
+
+    /// True if the frames are those of their rows in the history. A run that was resumed with other
+    /// steps or rows is not repeated by its deck.
+    pub fn belongs_to(&self, history: &HistoryReader) -> bool {
+        let column = |name: &str| history.names.iter().position(|other| other == name);
+        let columns = [column("stage"), column("time"), column("load")];
+        let moment = |frame: &Frame| [frame.at.stage as f64, frame.at.time, frame.at.load];
+        let size = |k: usize| self.reel.frames.iter().fold(0.0_f64, |size, frame| size.max(moment(frame)[k].abs()));
+        let sizes = [0, 1, 2].map(size);
+        self.reel.frames.iter().all(|frame| {
+            let Some(row) = history.rows.get(frame.row) else { return false };
+            let is_same = |k: usize| {
+                columns[k].is_none_or(|column| (row[column] - moment(frame)[k]).abs() <= OTHER_MOMENT * sizes[k])
+            };
+            (0..3).all(is_same)
+        })
+    }
+
+    /// Drops all frames.
+    pub fn clear(&mut self) {
+        self.reel.frames.clear();
+        self.reel.events.clear();
     }
 
     /// As the page takes it; `row` gives the number of a row of the history among those that are shown.

@@ -28,21 +28,24 @@ pub struct Report<'a> {
 }
 
 impl Report<'_> {
-    /// Writes the page of results in a folder.
-    pub fn write(&self, results: &Path, film: Film, path: &Path) -> Result<(), OutputError> {
-        PartFile::write_to(path, self.page(results, film)?.as_bytes())
+    /// Writes the page of results in a folder. Returns whether it has the shapes of the film, which
+    /// must be those of the history.
+    pub fn write(&self, results: &Path, mut film: Film, path: &Path) -> Result<bool, OutputError> {
+        let history = read_history(results)?;
+        film.end(filmed_rows(&history, self.record));
+        let belongs = film.belongs_to(&history);
+        if !belongs {
+            film.clear();
+        }
+        PartFile::write_to(path, self.page(results, &history, &film)?.as_bytes())?;
+        Ok(belongs)
     }
 
-    fn page(&self, results: &Path, mut film: Film) -> Result<String, OutputError> {
+    fn page(&self, results: &Path, history: &HistoryReader, film: &Film) -> Result<String, OutputError> {
         for name in ["modes.csv", "buckling.csv"].into_iter().filter(|name| results.join(name).exists()) {
             self.record.refuse_foreign(results, name)?;
         }
-        let history = HistoryReader::of_results(results)?.map(|path| HistoryReader::read(&path)).transpose()?;
-        let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
-        // The last row of a run that was stopped is the one of that moment, which the film passes
-        // over.
-        let filmed = history.rows.len() - usize::from(self.record.is_interrupted() && !history.rows.is_empty());
-        let shown = rows(&history, &film.end(filmed));
+        let shown = rows(history, &film.frame_rows());
         // The last row that is shown up to there.
         let row = |of: usize| shown.partition_point(|&k| k <= of).saturating_sub(1);
         let (bars, columns): (Vec<usize>, Vec<usize>) =
@@ -55,8 +58,8 @@ impl Report<'_> {
             "run": self.record.bare(),
             "length_unit": units.length(),
             "parts": parts(),
-            "history": table(&history, &shown, &columns, &units),
-            "bars": if bars.is_empty() { Value::Null } else { table(&history, &shown, &bars, &units) },
+            "history": table(history, &shown, &columns, &units),
+            "bars": if bars.is_empty() { Value::Null } else { table(history, &shown, &bars, &units) },
             "scene": film.to_json(&row, &units),
             "modes": small_table(&results.join("modes.csv"), &units)?,
             "buckling": small_table(&results.join("buckling.csv"), &units)?,
@@ -71,6 +74,18 @@ impl Report<'_> {
         ]
         .concat())
     }
+}
+
+/// The history of a folder of results; without any row where there is none.
+pub fn read_history(results: &Path) -> Result<HistoryReader, OutputError> {
+    let history = HistoryReader::of_results(results)?.map(|path| HistoryReader::read(&path)).transpose()?;
+    Ok(history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() }))
+}
+
+/// The rows of a history that its run reaches by the deck: not the last one of a run that was
+/// stopped, which is that of the moment.
+pub fn filmed_rows(history: &HistoryReader, record: &Record) -> usize {
+    history.rows.len() - usize::from(record.is_interrupted() && !history.rows.is_empty())
 }
 
 /// A small table of the results as columns, units and rows; null if there is no such file. Fields
