@@ -907,3 +907,23 @@ fn what_waits_at_rest_for_its_load_gains_no_energy() {
         assert_eq!(quiet.counters.findings.warnings, [], "{scheme}");
     }
 }
+
+/// A driven bead gets its energy from the drive, whose force changes its sign within each element.
+#[test]
+fn drives_of_sliders_do_the_work_that_moves_their_beads() {
+    for elements in [4, 8] {
+        let text = format!(
+            "[point]\na = [0, 0, 0]\nb = [4, 0, 0]\nc = [0.5, 0, 0]\n[section.s]\nEA = 1e5\nGA = 1e5\nGJ = 1e3\nEI = 1e3\nrhoA = 1\n\
+             [history.h]\nexpr = \"t^2 * (3 - t) / 4\"\n\
+             [[beam]]\nname = \"w\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = {elements}\norder = 2\n\
+             [[body]]\nat = \"c\"\nmass = 1\n[[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"b\"\nfix = \"all\"\n\
+             [[slider]]\nnodes = [\"c\"]\non = \"w\"\ndisplacement = 2\nhistory = \"h\"\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.01\nscheme = \"lobatto\"\n\
+             [output]\nnodes = [\"c\"]\ncolumns = [\"v\", \"energy\"]\n"
+        );
+        let simulation = simulate(&text);
+        assert!((simulation.end("c.vx") - 1.5).abs() < 0.01);
+        let [kinetic, total] = ["energy.kinetic", "energy.total"].map(|column| simulation.end(column));
+        assert!(total.abs() < 3e-3 * kinetic, "{elements}: {total} of {kinetic}");
+    }
+}
