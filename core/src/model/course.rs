@@ -5,6 +5,10 @@ use super::history::{HistoryClock, Phase, Reading};
 use crate::system::{StageKind, StageSet};
 use serde::{Deserialize, Serialize};
 
+/// Values that differ by this part of a ramp are the same: those of motions are read back from rounded
+/// places.
+const SAME_VALUE: f64 = 1e-9;
+
 /// The way of a load or a motion through one stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub enum Course {
@@ -233,7 +237,8 @@ impl Progress {
     /// The last ramp; from where all of it began, if it has reached its end.
     fn whole_ramp(&self) -> Option<Ramp> {
         let last = self.last_ramp?;
-        Some(if self.reached == last.to { Ramp { from: self.origin, ..last } } else { last })
+        let is_at_end = (self.reached - last.to).abs() <= SAME_VALUE * (last.to - self.origin).abs();
+        Some(if is_at_end { Ramp { from: self.origin, ..last } } else { last })
     }
 
     fn course_absent(&self, amplitude: &Amplitude, kind: StageKind) -> Course {

@@ -446,10 +446,14 @@ impl Dynamics<'_, '_> {
         Err(Failure::EnergyGrowth { at: self.stage.moment(), grown, largest })
     }
 
-    /// The energy of moving by what places are rounded by, in a step.
+    /// The energy of moving by what places are rounded by, in a step; zero where factors have taken
+    /// the place of the tangent.
     fn round_off_energy(&self) -> f64 {
         let StageRun { assembly, model, .. } = &*self.stage;
         let system = &assembly.system;
+        if system.holds_factors() {
+            return 0.0;
+        }
         let scales = model.scales(&system.pattern.dof_map);
         let mut stiffest = 0.0_f64;
         system.pattern.each_diagonal(|equation, place| {

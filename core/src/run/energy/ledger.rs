@@ -101,7 +101,8 @@ impl Bookkeeper {
         threads::copy(q, &state.q);
         copy_outside(system, state.q.len(), force);
         threads::copy(drag, &system.force[Category::Damping as usize]);
-        *drives = entry.drives();
+        // The forces of contacts in the middle are not remembered.
+        *drives = if entry.model.contacts().is_some() { Vec::new() } else { entry.drives() };
     }
 
     /// Initial motions have set a scene in motion, in a stage that is opened next: the kinetic
@@ -142,10 +143,9 @@ impl Bookkeeper {
             way.work(drag, through.map(|middle| &middle.drag[..]), |slot| system.part_of(Category::Damping, slot));
         let drives = entry.drives();
         for (k, (&(x0, f0), &(x1, f1))) in self.drives.iter().zip(&drives).enumerate() {
-            ledger.external += match through {
+            ledger.external += match through.and_then(|middle| middle.drives.get(k)) {
                 None => 0.5 * (f0 + f1) * (x1 - x0),
-                Some(middle) => {
-                    let (x, f) = middle.drives[k];
+                Some(&(x, f)) => {
                     let [before, within, after] = slopes(x - x0, x1 - x0);
                     (f0 * before + 4.0 * f * within + f1 * after) / 6.0
                 }

@@ -50,7 +50,9 @@ impl StageRun<'_> {
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
         let moved = moves.then_some(&prescribed_increment[..]);
         state.contacts.holds_on = model.contacts().is_some() && !state.contacts.is_clear;
-        newton.solve(model, assembly, state, &Equilibrium, moved, &mut counters.work)?;
+        let solved = newton.solve(model, assembly, state, &Equilibrium, moved, &mut counters.work);
+        state.contacts.holds_on = false;
+        solved?;
         self.refuse_far_steps()
     }
 
