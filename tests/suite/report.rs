@@ -21,7 +21,7 @@ const DECK: &str = "title = \"Pendulum & <body>\"\ngravity = [0, 0, -10]\n\
      [output]\nnodes = [\"a@end\", \"tip\", \"b@0.1\"]\ncolumns = [\"x\", \"d\", \"energy\"]\nevery = 4\n";
 
 /// The data of a page.
-fn data(page: &str) -> Value {
+pub fn data(page: &str) -> Value {
     let (_, rest) = page.split_once("<script id=\"data\" type=\"application/json\">").unwrap();
     serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
 }

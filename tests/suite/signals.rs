@@ -1,6 +1,7 @@
 //! Signals end the binary soon, wherever it is, and what was reached is kept.
 
 use super::folder::{Folder, last_line, status};
+use super::report::data;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::ExitStatusExt;
@@ -267,9 +268,7 @@ fn a_slurm_that_hangs_is_stopped() {
 /// The rows of the history that have shapes in the page of results.
 fn rows_with_shapes(folder: &Folder) -> Vec<u64> {
     let page = fs::read_to_string(folder.0.join("r/report.html")).unwrap();
-    let (_, rest) = page.split_once("<script id=\"data\" type=\"application/json\">").unwrap();
-    let data: serde_json::Value = serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap();
-    data["scene"]["rows"].as_array().unwrap().iter().map(|row| row.as_u64().unwrap()).collect()
+    data(&page)["scene"]["rows"].as_array().unwrap().iter().map(|row| row.as_u64().unwrap()).collect()
 }
 
 /// The shapes come from another run of the deck, which is not that of the history where a stopped run

@@ -233,6 +233,11 @@ mod tests {
     use super::*;
 
     impl FrictionLaw {
+        /// A law with the true tangent.
+        pub fn plain(coefficient: f64, stiffness: f64) -> Self {
+            Self { coefficient, stiffness, resistance: 0.0, goes_on: false, holds_on: false }
+        }
+
         /// The work of the present traction over the sliding, less the growth of the energy of elastic
         /// stick. It is not negative; in stick it is |t - t0|^2/(2 K_t).
         pub fn dissipation(&self, carried: &CarriedTraction, traction: &Traction) -> f64 {
@@ -242,13 +247,7 @@ mod tests {
     }
 
     fn random_law(random: &mut Random) -> FrictionLaw {
-        FrictionLaw {
-            coefficient: random.between(0.1, 0.8),
-            stiffness: random.between(0.5, 5.0),
-            resistance: 0.0,
-            goes_on: false,
-            holds_on: false,
-        }
+        FrictionLaw::plain(random.between(0.1, 0.8), random.between(0.5, 5.0))
     }
 
     fn random_traction(random: &mut Random) -> CarriedTraction {
@@ -355,8 +354,7 @@ mod tests {
         for _ in 0..300 {
             let carried = random_traction(&mut random);
             let n = (carried.normal + random.vector(0.5)).normalized().unwrap();
-            let law =
-                FrictionLaw { coefficient: 1.0, stiffness: 1.0, resistance: 0.0, goes_on: false, holds_on: false };
+            let law = FrictionLaw::plain(1.0, 1.0);
             let traction = law.traction(&carried, n, 1e3, Vec3::ZERO);
             assert_eq!(traction.status, Status::Sticks);
             assert!((traction.force.norm() - carried.force.norm()).abs() < 1e-15);

@@ -227,13 +227,7 @@ fn set_friction<const NA: usize, const NB: usize>(random: &mut Random, scene: &m
     let n0 = (normal + random.vector(0.2)).normalized().unwrap();
     let free = random.vector(0.3);
     scene.law.carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
-    scene.law.friction = Some(FrictionLaw {
-        coefficient: random.between(0.1, 1.5),
-        stiffness: random.between(0.5, 3.0),
-        resistance: 0.0,
-        goes_on: false,
-        holds_on: false,
-    });
+    scene.law.friction = Some(FrictionLaw::plain(random.between(0.1, 1.5), random.between(0.5, 3.0)));
 }
 
 fn check<const NA: usize, const NB: usize>(random: &mut Random, wanted: usize, errors: &mut Errors) {
@@ -337,8 +331,7 @@ fn rigid_motions_within_a_step_do_not_slide() {
         let free = random.vector(0.3);
         scene.law.carried =
             CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
-        scene.law.friction =
-            Some(FrictionLaw { coefficient: 100.0, stiffness: 2.0, resistance: 0.0, goes_on: false, holds_on: false });
+        scene.law.friction = Some(FrictionLaw::plain(100.0, 2.0));
         let by = random.rotation(3.0).r;
         let (_, state) = scene.moved(&by, random.vector(2.0)).now(Weights::NONE);
         let change = (state.traction.force - scene.law.carried.force).max_abs();
@@ -368,13 +361,7 @@ fn rods_that_roll_on_each_other_do_not_slide() {
         law: PairLaw {
             radii: [1.0, 2.0],
             normal: NormalLaw::Penalty { stiffness: 100.0, damping: 0.0, offset: 0.0 },
-            friction: Some(FrictionLaw {
-                coefficient: 0.5,
-                stiffness: 10.0,
-                resistance: 0.0,
-                goes_on: false,
-                holds_on: false,
-            }),
+            friction: Some(FrictionLaw::plain(0.5, 10.0)),
             carried: CarriedTraction::default(),
             carrier: 0,
             free: [false, false],

@@ -293,13 +293,7 @@ fn set_friction<const N: usize>(random: &mut Random, scene: &mut Scene<N>, norma
     let n0 = (normal + random.vector(0.2)).normalized().unwrap();
     let free = random.vector(0.3);
     scene.law.carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
-    scene.law.friction = Some(FrictionLaw {
-        coefficient: random.between(0.1, 1.5),
-        stiffness: random.between(0.5, 3.0),
-        resistance: 0.0,
-        goes_on: false,
-        holds_on: false,
-    });
+    scene.law.friction = Some(FrictionLaw::plain(random.between(0.1, 1.5), random.between(0.5, 3.0)));
 }
 
 /// Sums of spatial forces and of moments about the origin, of the element and the carrier.
@@ -509,8 +503,7 @@ fn at_rest(random: &mut Random, surface: &Surface) -> Scene<3> {
         let body = |i: usize| &scene.bodies[i];
         scene.before =
             from_fn(|i| NodeBefore::of(body(i).place(), body(i).rotation().r, carrier.place, &carrier.rotation.r));
-        scene.law.friction =
-            Some(FrictionLaw { coefficient: 50.0, stiffness: 2.0, resistance: 0.0, goes_on: false, holds_on: false });
+        scene.law.friction = Some(FrictionLaw::plain(50.0, 2.0));
         let (_, state) = scene.now(Weights::NONE);
         let n0 = state.normal;
         let free = random.vector(0.3);
@@ -552,13 +545,7 @@ fn balls_that_roll_do_not_slide() {
         law: ContactLaw {
             radius,
             normal: NormalLaw::Penalty { stiffness: 100.0, damping: 0.0, offset: 0.0 },
-            friction: Some(FrictionLaw {
-                coefficient: 0.5,
-                stiffness: 10.0,
-                resistance: 0.0,
-                goes_on: false,
-                holds_on: false,
-            }),
+            friction: Some(FrictionLaw::plain(0.5, 10.0)),
             carried: CarriedTraction::default(),
             place: Place::Fixed,
             weight: 1.0,

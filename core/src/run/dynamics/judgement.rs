@@ -35,7 +35,7 @@ impl Dynamics<'_, '_> {
     pub(super) fn warn_of_imbalance(&mut self) {
         let Some(guard) = &self.guard else { return };
         let Some(Imbalance { share, is_own }) = guard.imbalance(self.stage.bookkeeper.scale()) else { return };
-        if self.stage.bookkeeper.scale() <= self.round_off_energy() {
+        if self.is_round_off(self.stage.bookkeeper.scale()) {
             return;
         }
         let is_told = std::mem::replace(&mut self.stage.issued.unbalanced, true);

@@ -31,7 +31,8 @@ const SMALLEST_PART: f64 = 1.0 / 64.0;
 /// Attempts at a step with more pairs of beams near each other, at most.
 const MOST_LISTS: usize = 4;
 
-/// What places are rounded by on the way through Newton's method, in lengths of the scene and radians.
+/// What places are rounded by on the way through Newton's method, in lengths of the scene and radians: 1e4
+/// times the round-off of one operation.
 const ROUNDED: f64 = 1e-12;
 
 /// Strains that Newton may leave where an iteration ends.
@@ -440,26 +441,26 @@ impl Dynamics<'_, '_> {
         let Some(guard) = &mut self.guard else { return Ok(()) };
         let moved = self.stage.model.farthest(self.stage.good, self.stage.state);
         let Some(Growth { grown, largest }) = guard.judge(self.stage.bookkeeper.ledger(), moved) else { return Ok(()) };
-        if largest <= self.round_off_energy() {
+        if self.is_round_off(largest) {
             return Ok(());
         }
         Err(Failure::EnergyGrowth { at: self.stage.moment(), grown, largest })
     }
 
-    /// The energy of moving by what places are rounded by, in a step; zero where factors have taken
-    /// the place of the tangent.
-    fn round_off_energy(&self) -> f64 {
-        let StageRun { assembly, model, .. } = &*self.stage;
+    /// True if an energy is that of moving by what places are rounded by, in a step. The tangent is
+    /// formed anew for it, and the guard passes over such energies from here on.
+    fn is_round_off(&mut self, energy: f64) -> bool {
+        let StageRun { assembly, model, state, .. } = &mut *self.stage;
+        assembly.form_again(state, Weights { mass: self.last_length.powi(-2), ..Weights::STIFFNESS });
         let system = &assembly.system;
-        if system.holds_factors() {
-            return 0.0;
-        }
         let scales = model.scales(&system.pattern.dof_map);
         let mut stiffest = 0.0_f64;
         system.pattern.each_diagonal(|equation, place| {
             stiffest = stiffest.max(system.values[place].abs() * scales[equation].powi(2));
         });
-        stiffest * ROUNDED.powi(2)
+        let of_round_off = stiffest * ROUNDED.powi(2);
+        self.guard.iter_mut().for_each(|guard| guard.pass_over(of_round_off));
+        energy <= of_round_off
     }
 
     /// Names the failure and goes back to the last good state.

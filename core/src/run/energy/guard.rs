@@ -76,6 +76,11 @@ impl EnergyGuard {
         self.largest = size(ledger);
     }
 
+    /// Passes over energies up to one that is round-off.
+    pub fn pass_over(&mut self, energy: f64) {
+        self.floor = self.floor.max(energy);
+    }
+
     /// The error of the account of the run, if that is worth a warning; `scale` is the largest
     /// energy of the run so far.
     pub fn imbalance(&self, scale: f64) -> Option<Imbalance> {

@@ -49,7 +49,7 @@ impl StageRun<'_> {
         let moves = self.set_load(load)?;
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
         let moved = moves.then_some(&prescribed_increment[..]);
-        state.contacts.holds_on = model.contacts().is_some() && !state.contacts.is_clear;
+        state.contacts.holds_on = !state.contacts.is_clear && model.contacts().is_some_and(|contacts| contacts.rubs());
         let solved = newton.solve(model, assembly, state, &Equilibrium, moved, &mut counters.work);
         state.contacts.holds_on = false;
         solved?;
