@@ -99,7 +99,9 @@ pub fn write(
     path: &Path,
 ) -> Result<(), CommandError> {
     let title = scene.title.as_deref().unwrap_or(name);
-    if !(Report { title, record }.write(results, film, path)?) {
+    let has_shapes = Report { title, record }.write(results, film, path)?;
+    if !has_shapes {
+        console::count_warnings(1);
         console::note(&format!(
             "warning: {}: without shapes, since the deck run again does not pass through the rows of the history: the run was \
              resumed with other steps or rows. Run the deck again with --report",

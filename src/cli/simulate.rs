@@ -336,6 +336,7 @@ impl Observer for Watcher<'_> {
         let row = row?;
         if let Some(film) = &mut self.film {
             film.row(snapshot, row);
+            // A run for its film alone ends with it; nobody asks how.
             if film.is_complete() {
                 return Err(Failure::Io("all rows that were asked for are recorded".into()));
             }

@@ -14,7 +14,9 @@ from top to bottom:
 - A `text` block shows what the last block of commands under the same heading prints: each of its lines must be there, in order; an ellipsis stands for anything, a
   line of nothing else, like an empty one, for any lines. After `cat FILE` the block that follows is held against the file, whatever its language.
 
-As many pages are worked through at once as there are cores. In all pages below docs/, in README.md and CHANGELOG.md relative links must lead to files, and anchors to headings. In the guide they must stay in
+As many pages are worked through at once as there are cores.
+
+In all pages below docs/, in README.md and CHANGELOG.md relative links must lead to files, and anchors to headings. In the guide they must stay in
 docs/, since the site holds nothing else; and every page must be in SUMMARY.md. With --site the built HTML is held to the same.
 
 Ends with status 1 if anything fails.

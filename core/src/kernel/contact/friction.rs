@@ -44,9 +44,9 @@ pub struct FrictionLaw {
     /// a step. Otherwise all points would stick there, and a rope that is pulled over a drum would be
     /// torn apart by each first correction.
     pub(crate) goes_on: bool,
-    /// True if a contact that stuck has no limit, as before the first correction of a level: a surface
-    /// may have moved far, and what sticks to it has yet to follow. With the tangent of sliding it never
-    /// would.
+    /// True if the traction of a contact that stuck has no limit: before the first correction of a
+    /// level a surface may have moved far, and what sticks to it has yet to follow. The tangent of
+    /// sliding has no stiffness that would take it along.
     pub(crate) holds_on: bool,
 }
 

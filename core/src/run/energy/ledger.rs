@@ -219,7 +219,7 @@ struct Way<'a> {
 
 impl Way<'_> {
     /// The work of forces, which are `within` in the middle, and `after` where it ends; these take the
-    /// place of those `before`. Forces that are always zero may be left out.
+    /// place of those `before`. Where nothing damps, `before` is empty.
     fn work(&self, before: &mut [Vec3], within: Option<&[Vec3]>, after: impl Fn(usize) -> Vec3 + Send + Sync) -> f64 {
         let ((q0, wound0), (q1, wound1)) = (self.from, self.to);
         let of_part = |(number, before): (usize, &mut [Vec3])| {
