@@ -95,10 +95,9 @@ fn chosen<'d>(deck: &'d Deck, names: &[String]) -> Result<Vec<&'d deck::Section>
         return Ok(deck.sections.iter().collect());
     }
     let find = |name: &String| {
-        let found = deck.sections.iter().find(|section| section.name.value == *name);
-        found.ok_or_else(|| {
-            let known = deck.sections.iter().map(|section| section.name.value.as_str());
-            CommandError::Usage(format!("the deck has no section `{name}`, only {}", deck::one_of(known)))
+        deck.sections.named(name).ok_or_else(|| {
+            let known = deck::one_of(deck.sections.names());
+            CommandError::Usage(format!("the deck has no section `{name}`, only {known}"))
         })
     };
     names.iter().map(find).collect()

@@ -1,6 +1,7 @@
 //! `[[beam]]`: centre line, sections and mesh of a beam.
 
 use super::axes::{read_direction, read_unit};
+use super::by_name::Named;
 use super::diagnostic::{Span, Spanned};
 use super::division::{Division, read_divisions, read_elements};
 use super::history::{HistoryUse, read_history_use};
@@ -115,6 +116,12 @@ pub struct Beam {
     pub free_strain: Option<FreeStrain>,
     /// Place of the table
     pub span: Span,
+}
+
+impl Named for Beam {
+    fn name(&self) -> &str {
+        &self.name.value
+    }
 }
 
 impl Beam {

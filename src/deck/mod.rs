@@ -11,6 +11,7 @@ mod accuracy;
 mod axes;
 mod beam;
 mod body;
+mod by_name;
 mod contact;
 mod cost;
 mod damping;
@@ -56,6 +57,7 @@ pub use accuracy::{Accuracy, is_named, without_stage};
 pub use axes::Axes;
 pub use beam::{Beam, FreeStrain, Helix, InterpolationWord, Path, SplinePath, StationsWord};
 pub use body::Body;
+pub use by_name::{ByName, Named};
 pub use contact::{Contact, ContactDamping, ContactRadius, EndsWord};
 pub use cost::{Cost, NormWord};
 pub use damping::Damping;
@@ -111,15 +113,15 @@ pub struct Deck {
     /// Acceleration of gravity
     pub gravity: Option<Spanned<[f64; 3]>>,
     /// Named places
-    pub points: Vec<(Spanned<String>, [f64; 3])>,
+    pub points: ByName<(Spanned<String>, [f64; 3])>,
     /// Materials
     pub(crate) materials: Vec<Material>,
     /// Plies of walls
     pub(crate) layups: Vec<Layup>,
     /// Sections
-    pub sections: Vec<Section>,
+    pub sections: ByName<Section>,
     /// Beams
-    pub beams: Vec<Beam>,
+    pub beams: ByName<Beam>,
     /// Supports
     pub supports: Vec<Support>,
     /// Prescribed motions
@@ -240,24 +242,24 @@ fn longest_key(text: &str) -> Span {
 
 fn read_tables(context: &Context, document: &DeTable) -> Deck {
     let top = Table::top(context, document, "the deck", &KEYS);
-    let points = point::read_points(&top);
+    let points = ByName::from(point::read_points(&top));
     let materials = named(&top, "material", material::read_material);
     let layups = named(&top, "layup", layup::read_layup);
     let layup_names = names_below(&top, "layup");
-    let sections =
-        named(&top, "section", |context, name, item| section::read_section(context, name, item, &layup_names));
-    let beams = listed(&top, "beam", beam::read_beam);
+    let read_section = |context: &_, name, item: &_| section::read_section(context, name, item, &layup_names);
+    let sections = ByName::from(named(&top, "section", read_section));
+    let beams = ByName::from(listed(&top, "beam", beam::read_beam));
     let joints = listed(&top, "joint", joint::read_joint);
     let bodies = listed(&top, "body", body::read_body);
     let surfaces = listed(&top, "surface", surface::read_surface);
     let contacts = listed(&top, "contact", contact::read_contact);
     let histories = named(&top, "history", history::read_history);
     let read: Vec<&str> = [
-        points.iter().map(|(name, _)| name.value.as_str()).collect::<Vec<_>>(),
+        points.names().collect::<Vec<_>>(),
         materials.iter().map(|m| m.name.value.as_str()).collect(),
         layups.iter().map(|l| l.name.value.as_str()).collect(),
-        sections.iter().map(|s| s.name.value.as_str()).collect(),
-        beams.iter().map(|b| b.name.value.as_str()).collect(),
+        sections.names().collect(),
+        beams.names().collect(),
         surfaces.iter().map(|s| s.name.value.as_str()).collect(),
         contacts.iter().map(|c| c.name.value.as_str()).collect(),
         histories.iter().map(|h| h.name.value.as_str()).collect(),

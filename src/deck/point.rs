@@ -1,5 +1,6 @@
 //! `[point]`: named places; and places in other tables, by a name or by coordinates.
 
+use super::by_name::Named;
 use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table, kind_of};
 use super::shown::hides_text;
@@ -12,6 +13,12 @@ pub enum PointRef {
     Name(String),
     /// A place without a name
     Coordinates([f64; 3]),
+}
+
+impl Named for (Spanned<String>, [f64; 3]) {
+    fn name(&self) -> &str {
+        &self.0.value
+    }
 }
 
 pub(super) fn read_points(top: &Table) -> Vec<(Spanned<String>, [f64; 3])> {

@@ -1,5 +1,6 @@
 //! `[section.NAME]`: stiffness and mass of a cross-section.
 
+use super::by_name::Named;
 use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table, joined, kind_of};
 use super::section_shape::{self, ComputedSection};
@@ -17,6 +18,12 @@ pub struct Section {
     pub(crate) probes: Vec<SectionProbe>,
     /// Search for the largest stress near re-entrant corners
     pub(crate) corner: CornerWord,
+}
+
+impl Named for Section {
+    fn name(&self) -> &str {
+        &self.name.value
+    }
 }
 
 /// A named point of a shape.

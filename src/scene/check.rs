@@ -5,7 +5,7 @@ use super::contacts;
 use super::mesh::Mesh;
 use super::scheme::coefficients;
 use super::section::{self, contraction, solid_material};
-use crate::deck::{self, Deck, Diagnostic, Elastic, LoadTarget, MotionWhat, SectionBody, Spanned, StageBody};
+use crate::deck::{self, Deck, Diagnostic, Elastic, LoadTarget, MotionWhat, Named, SectionBody, Spanned, StageBody};
 use beamsim_core::integrate::Stages;
 use beamsim_core::model::{StageSet, Support};
 use beamsim_core::system::Direction;
@@ -78,8 +78,9 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 
 /// Warns of computed sections, which beams use, whose error is large, and of their materials.
 fn warn_of_sections(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let is_used = |name: &str| deck.beams.iter().any(|beam| beam.sections.iter().any(|own| own.value == name));
-    let used = || deck.sections.iter().filter(|section| is_used(&section.name.value));
+    let users: HashSet<&str> =
+        deck.beams.iter().flat_map(|beam| &beam.sections).map(|name| name.value.as_str()).collect();
+    let used = || deck.sections.iter().filter(|section| users.contains(section.name()));
     diagnostics.extend(used().filter_map(|section| super::computed::warning(section, deck)));
     let is_solid_of =
         |section: &deck::Section, material: &str| solid_material(section).is_some_and(|name| name.value == material);
@@ -101,7 +102,7 @@ fn warn_of_sections(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 
 /// Warns of stiffness that is linear between two computed sections which differ much.
 fn warn_of_coarse_tapers(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let section = |name: &Spanned<String>| deck.sections.iter().find(|section| section.name.value == name.value);
+    let section = |name: &Spanned<String>| deck.sections.named(&name.value);
     for beam in &deck.beams {
         let excess = |pair: &[Spanned<String>]| {
             let ends = [section(&pair[0])?, section(&pair[1])?];
@@ -132,13 +133,14 @@ fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         return;
     }
     let why = if dynamic { "a stage with inertia" } else { "`gravity`" };
-    let section = |name: &str| deck.sections.iter().find(|section| section.name.value == name);
     for own in &deck.sections {
+        let Some(Missing { key, zero }) = missing_mass(deck, own) else { continue };
         let used = |beam: &&deck::Beam| beam.sections.iter().any(|name| name.value == own.name.value);
         let users: Vec<&deck::Beam> = deck.beams.iter().filter(used).collect();
-        let (Some(beam), Some(Missing { key, zero })) = (users.first(), missing_mass(deck, own)) else { continue };
+        let Some(beam) = users.first() else { continue };
         // Between a section with mass and one without there is no taper of mass.
-        let has_mass = |name: &Spanned<String>| section(&name.value).is_some_and(|s| missing_mass(deck, s).is_none());
+        let has_mass =
+            |name: &Spanned<String>| deck.sections.named(&name.value).is_some_and(|s| missing_mass(deck, s).is_none());
         let tapers = users.iter().any(|beam| beam.sections.iter().any(has_mass));
         let name = &own.name;
         let diagnostic = if deck.bodies.is_empty() || tapers {

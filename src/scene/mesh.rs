@@ -3,7 +3,7 @@
 use super::names;
 use super::path::{self, CentreLine, Cover};
 use super::section::{self, SectionCourse};
-use crate::deck::{self, Deck, Diagnostic, Division, JointParts, PointRef, Spanned, StationsWord};
+use crate::deck::{self, ByName, Deck, Diagnostic, Division, JointParts, Named, PointRef, Spanned, StationsWord};
 use beamsim_core::model::Names;
 use beamsim_core::model::beam_element::{ElementGeometry, PlacedNode, Rule, Station, shape_at};
 use beamsim_core::system::Node;
@@ -121,6 +121,12 @@ pub struct MeshBeam {
     pub(crate) section: SectionCourse,
 }
 
+impl Named for MeshBeam {
+    fn name(&self) -> &str {
+        &self.name
+    }
+}
+
 impl MeshBeam {
     /// Indices of the nodes of an element.
     pub fn nodes_of(&self, element: usize) -> &[usize] {
@@ -182,7 +188,7 @@ pub struct Mesh {
     /// The nodes
     pub nodes: Vec<PlacedNode>,
     /// The beams
-    pub beams: Vec<MeshBeam>,
+    pub beams: ByName<MeshBeam>,
     /// The number of elements, beam after beam
     pub element_count: usize,
     /// The node of each named point that is one: the first-named beam's where a joint parts it
@@ -252,11 +258,10 @@ impl Mesh {
                 diagnostics.push(names::unknown("point", at, names::points(deck)));
                 continue;
             };
-            let known: Vec<_> =
-                beams.iter().filter(|b| deck.beams.iter().any(|beam| beam.name.value == b.value)).collect();
+            let known: Vec<_> = beams.iter().filter(|beam| deck.beams.number(&beam.value).is_some()).collect();
             if known.len() < beams.len() {
                 for beam in beams.iter().filter(|b| !known.iter().any(|k| k.value == b.value)) {
-                    diagnostics.push(names::unknown("beam", beam, deck.beams.iter().map(|b| b.name.value.as_str())));
+                    diagnostics.push(names::unknown("beam", beam, deck.beams.names()));
                 }
                 continue;
             }
@@ -293,7 +298,7 @@ impl Mesh {
             let JointParts::Beams { at, beams } = &joint.parts else { continue };
             let Some(&main) = self.points.get(&at.value) else { continue };
             for name in beams {
-                let Some(beam) = self.beams.iter().find(|beam| beam.name == name.value) else { continue };
+                let Some(beam) = self.beams.named(&name.value) else { continue };
                 let own = self.parted.get(&(name.value.clone(), at.value.clone())).unwrap_or(&main);
                 if passes(deck, &name.value, &at.value) && !beam.nodes.contains(own) {
                     let message = format!("beam `{}` has no node at the point `{}`", name.value, at.value);
@@ -328,8 +333,8 @@ impl Mesh {
     /// Centre line and section of a beam.
     fn plan(&self, beam: &deck::Beam, deck: &Deck) -> Result<(CentreLine, SectionCourse), Diagnostic> {
         let find = |name: &Spanned<String>| {
-            let found = deck.sections.iter().find(|s| s.name.value == name.value);
-            found.ok_or_else(|| names::unknown("section", name, deck.sections.iter().map(|s| s.name.value.as_str())))
+            let found = deck.sections.named(&name.value);
+            found.ok_or_else(|| names::unknown("section", name, deck.sections.names()))
         };
         let section = match &beam.sections[..] {
             [] => return Err(Diagnostic::error("a beam needs a section", beam.span.clone())),
@@ -497,8 +502,7 @@ fn named_between<'a>(
 
 /// True if the path of a beam names a point.
 fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
-    let found = deck.beams.iter().find(|b| b.name.value == beam);
-    found.is_some_and(|b| {
+    deck.beams.named(beam).is_some_and(|b| {
         let is_middle = matches!(
             &b.path,
             deck::Path::Arc([_, Spanned { value: PointRef::Name(middle), .. }, _]) if middle == point

@@ -543,10 +543,10 @@ fn initial(
                 return None;
             }
         },
-        deck::InitialTarget::Beam(name) => match mesh.beams.iter().find(|b| b.name == name.value) {
+        deck::InitialTarget::Beam(name) => match mesh.beams.named(&name.value) {
             Some(beam) => beam.nodes.clone(),
             None => {
-                report(names::unknown("beam", name, deck.beams.iter().map(|b| b.name.value.as_str())));
+                report(names::unknown("beam", name, deck.beams.names()));
                 return None;
             }
         },

@@ -17,7 +17,7 @@ pub enum Found {
 
 /// The place of a named point.
 pub fn point(deck: &Deck, name: &str) -> Option<Vec3> {
-    deck.points.iter().find(|(known, _)| known.value == name).map(|(_, x)| Vec3(*x))
+    deck.points.named(name).map(|(_, x)| Vec3(*x))
 }
 
 /// The coordinates of a point that the deck gives by its name or its coordinates.
@@ -33,7 +33,7 @@ pub fn place(deck: &Deck, point: &Spanned<PointRef>) -> Result<Vec3, Diagnostic>
 
 /// The names of all points.
 pub fn points(deck: &Deck) -> impl Iterator<Item = &str> {
-    deck.points.iter().map(|(name, _)| name.value.as_str())
+    deck.points.names()
 }
 
 /// Names with which a misspelt one is compared, at most.
@@ -119,10 +119,10 @@ impl Mesh {
     }
 
     fn beam(&self, deck: &Deck, name: &Spanned<String>, beam: &str) -> Result<usize, Diagnostic> {
-        self.beams.iter().position(|b| b.name == beam).ok_or_else(|| {
+        self.beams.number(beam).ok_or_else(|| {
             let name = Spanned { value: beam.to_string(), span: name.span.clone() };
-            let mut diagnostic = unknown("beam", &name, deck.beams.iter().map(|b| b.name.value.as_str()));
-            if deck.beams.iter().any(|b| b.name.value == beam) {
+            let mut diagnostic = unknown("beam", &name, deck.beams.names());
+            if deck.beams.number(beam).is_some() {
                 // It could not be meshed, which is told already.
                 diagnostic.unknown = None;
             }

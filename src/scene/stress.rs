@@ -100,16 +100,15 @@ impl<'d> SectionStresses<'d> {
     }
 
     fn beam(&self, name: &str, span: &Span) -> Result<&'d Beam, Diagnostic> {
-        let known = self.deck.beams.iter().find(|known| known.name.value == name);
+        let known = self.deck.beams.named(name);
         known.ok_or_else(|| Diagnostic::error(format!("there is no beam `{name}`"), span.clone()))
     }
 
     fn find(&self, known: &'d Beam, fraction: f64) -> Result<Found<'d>, Diagnostic> {
         let section = |k: usize| {
             let name = &known.sections[k];
-            let found = self.deck.sections.iter().find(|section| section.name.value == name.value);
-            let all = self.deck.sections.iter().map(|section| section.name.value.as_str());
-            found.ok_or_else(|| names::unknown("section", name, all))
+            let found = self.deck.sections.named(&name.value);
+            found.ok_or_else(|| names::unknown("section", name, self.deck.sections.names()))
         };
         let stations = stations(known);
         if let Some(k) = stations.iter().position(|station| (station - fraction).abs() <= AT_STATION) {

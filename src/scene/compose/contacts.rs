@@ -226,9 +226,8 @@ impl Composer<'_> {
 
     /// A beam of contact number `own`.
     fn beam_named(&mut self, contact: &deck::Contact, name: &Spanned<String>, own: usize) -> Option<Strand> {
-        let Some(number) = self.mesh.beams.iter().position(|beam| beam.name == name.value) else {
-            let known = self.deck.beams.iter().map(|beam| beam.name.value.as_str());
-            self.report(unknown("beam", name, known));
+        let Some(number) = self.mesh.beams.number(&name.value) else {
+            self.report(unknown("beam", name, self.deck.beams.names()));
             return None;
         };
         let radius = self.radius(contact, name, Some(&self.mesh.beams[number]))?;
@@ -408,12 +407,12 @@ fn shortest_step(deck: &Deck) -> Option<f64> {
 
 /// The radius of a beam whose sections are equal circles or tubes about its line.
 fn radius_of_sections(deck: &Deck, beam: &str) -> Option<f64> {
-    let beam = deck.beams.iter().find(|known| known.name.value == beam)?;
+    let beam = deck.beams.named(beam)?;
     if !path::along(beam, beam.offset.as_ref()).is_zero() {
         return None;
     }
     let radius = |name: &Spanned<String>| {
-        let section = deck.sections.iter().find(|section| section.name.value == name.value)?;
+        let section = deck.sections.named(&name.value)?;
         let SectionBody::Computed(body) = &section.body else { return None };
         let (shape, _) = body.solid_without_mesh()?;
         match shape {

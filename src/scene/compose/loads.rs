@@ -83,10 +83,9 @@ impl Composer<'_> {
         let mut nodal = NodeLoads::default();
         for load in &self.deck.loads {
             let LoadTarget::Along(along) = &load.target else { continue };
-            let Some(beam) = self.mesh.beams.iter().find(|b| b.name == along.value) else {
-                if !self.deck.beams.iter().any(|b| b.name.value == along.value) {
-                    let known = self.deck.beams.iter().map(|b| b.name.value.as_str());
-                    self.diagnostics.push(names::unknown("beam", along, known));
+            let Some(beam) = self.mesh.beams.named(&along.value) else {
+                if self.deck.beams.number(&along.value).is_none() {
+                    self.diagnostics.push(names::unknown("beam", along, self.deck.beams.names()));
                 }
                 continue;
             };

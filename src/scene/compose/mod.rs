@@ -283,9 +283,8 @@ impl Composer<'_> {
     /// The amplitudes of free strains, by beam.
     fn free_strains(&mut self) -> HashMap<String, usize> {
         let deck = self.deck;
-        let of_beam = |name: &str| deck.beams.iter().find(|beam| beam.name.value == name);
         let mut numbered = HashMap::new();
-        for beam in self.mesh.beams.iter().filter_map(|beam| of_beam(&beam.name)) {
+        for beam in self.mesh.beams.iter().filter_map(|beam| deck.beams.named(&beam.name)) {
             let Some(free) = &beam.free_strain else { continue };
             let number = self.amplitude_of("free strain", &beam.span, free.history.as_ref(), None);
             numbered.extend(number.map(|number| (beam.name.value.clone(), number)));

@@ -54,10 +54,9 @@ impl Composer<'_> {
     }
 
     fn beam_number(&mut self, name: &Spanned<String>) -> Option<usize> {
-        let found = self.mesh.beams.iter().position(|beam| beam.name == name.value);
+        let found = self.mesh.beams.number(&name.value);
         if found.is_none() {
-            let known = self.deck.beams.iter().map(|beam| beam.name.value.as_str());
-            self.diagnostics.push(unknown("beam", name, known));
+            self.diagnostics.push(unknown("beam", name, self.deck.beams.names()));
         }
         found
     }
