@@ -72,14 +72,28 @@ const DEPENDENT_NORM_RATIO: f64 = 1e-11;
 /// dimensions. `None` if an image cannot be computed, or after a request to stop.
 pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Spectrum> {
     let most = most_vectors(operator, wanted);
-    eigenvalues_within(operator, wanted, most)
+    let (space, _) = converged_space(operator, wanted, most, &|_| false)?;
+    space.spectrum(operator.is_symmetric(), wanted)
+}
+
+/// The eigenvalues of largest magnitude, descending, so many of them that `is_enough`, but no more than
+/// `most_wanted`, or than the space has dimensions. `None` if an image cannot be computed, or after a request to
+/// stop.
+pub fn leading_eigenvalues_until(
+    operator: &mut dyn Operator,
+    most_wanted: usize,
+    is_enough: &dyn Fn(&[Complex<f64>]) -> bool,
+) -> Option<Vec<Complex<f64>>> {
+    let most = most_vectors(operator, most_wanted);
+    converged_space(operator, most_wanted, most, is_enough).map(|(_, values)| values)
 }
 
 /// Rough estimates of the eigenvalues of largest magnitude from a few images. `None` if an image
 /// cannot be computed, or after a request to stop.
 pub fn roughly_largest_eigenvalues(operator: &mut dyn Operator) -> Option<Vec<Complex<f64>>> {
     let most = operator.size().min(ROUGH_BASIS_SIZE);
-    eigenvalues_within(operator, most, most).map(|spectrum| spectrum.values)
+    let (space, _) = converged_space(operator, most, most, &|_| false)?;
+    space.spectrum(operator.is_symmetric(), most).map(|spectrum| spectrum.values)
 }
 
 /// The `wanted` eigenvalues of largest magnitude that have converged, descending; of multiple ones
@@ -140,8 +154,15 @@ fn most_vectors(operator: &dyn Operator, wanted: usize) -> usize {
     operator.size().min(24 * wanted + 160)
 }
 
-/// Eigenvalues from a basis of at most `most` vectors, see [`largest_eigenvalues`].
-fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -> Option<Spectrum> {
+/// A space of at most `most` vectors in which the `wanted` eigenvalues of largest magnitude have converged, or so
+/// many of them that `is_enough`, and those eigenvalues. `None` if an image cannot be computed, or after a request
+/// to stop.
+fn converged_space(
+    operator: &mut dyn Operator,
+    wanted: usize,
+    most: usize,
+    is_enough: &dyn Fn(&[Complex<f64>]) -> bool,
+) -> Option<(KrylovSpace, Vec<Complex<f64>>)> {
     let mut space = KrylovSpace::starting(operator, BLOCK_SIZE)?;
     // A few more eigenvalues than wanted must converge, lest the second of a pair is missed.
     let guard = wanted + BLOCK_SIZE;
@@ -154,14 +175,18 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
             continue;
         }
         look = space.applied() + space.applied() / 4;
-        let now = space.eigenvalues(operator.is_symmetric(), guard)?;
-        let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= EIGENVALUE_TOLERANCE * a.norm();
-        let still = now.len() == last.len()
-            && now.len() >= wanted.min(operator.size())
-            && now.iter().zip(&last).take(guard).all(same);
-        if still || !grows {
-            let pairs = space.pairs(operator.is_symmetric(), wanted)?;
-            return Some(Spectrum::of(pairs, space));
+        let mut now = space.eigenvalues(operator.is_symmetric(), guard)?;
+        let same = |&(a, b): &(&Complex<f64>, &Complex<f64>)| (a - b).norm() <= EIGENVALUE_TOLERANCE * a.norm();
+        let converged = now.iter().zip(&last).take_while(same).count();
+        let is_all = converged == now.len().max(last.len()) && converged >= wanted.min(operator.size());
+        if is_all || !grows {
+            now.truncate(wanted);
+            return Some((space, now));
+        }
+        let leading = converged.saturating_sub(BLOCK_SIZE);
+        if is_enough(&now[..leading]) {
+            now.truncate(leading);
+            return Some((space, now));
         }
         last = now;
     }
@@ -422,6 +447,12 @@ impl KrylovSpace {
         sort_by(&mut values, largest_first);
         values.truncate(wanted);
         Some(values)
+    }
+
+    /// The largest eigenvalues and their vectors. `None` after a request to stop.
+    fn spectrum(self, is_symmetric: bool, wanted: usize) -> Option<Spectrum> {
+        let pairs = self.pairs(is_symmetric, wanted)?;
+        Some(Spectrum::of(pairs, self))
     }
 
     /// The largest eigenvalues with their eigenvectors. `None` after a request to stop.

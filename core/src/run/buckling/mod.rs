@@ -10,7 +10,7 @@ mod spectrum;
 mod walk;
 
 use self::search::{CriticalSearch, Sight};
-use self::spectrum::{critical_loads, negative_pivots, rank};
+use self::spectrum::{critical_loads, negative_pivots, next_critical_load, rank};
 use self::walk::{Walked, continue_path, has_leapt};
 use super::distance::distance;
 use super::failure::Failure;
@@ -203,7 +203,7 @@ impl Buckling<'_, '_> {
                         self.warn_of_turn_aside(found);
                     }
                     // A step from further away came down elsewhere, or nowhere.
-                    let ahead = self.next_critical(search.way, before)?;
+                    let ahead = next_critical_load(self.stage, search.way, before)?;
                     search.go_on_from(self.stage.state, ahead);
                     continue;
                 }
@@ -235,7 +235,7 @@ impl Buckling<'_, '_> {
             if passed > before {
                 search.close_at(target, self.stage.state.clone());
             } else {
-                let ahead = self.next_critical(search.way, before - passed)?;
+                let ahead = next_critical_load(self.stage, search.way, before - passed)?;
                 search.advance(self.stage.state, ahead);
             }
         }
@@ -260,14 +260,6 @@ impl Buckling<'_, '_> {
         Ok(walked == Walked::There
             && !has_leapt(self.stage, &search.here)?
             && negative.is_some_and(|most| negative_pivots(self.stage).is_some_and(|count| count <= most)))
-    }
-
-    /// The critical load with `before` others between it and the present one, as it looks from
-    /// here.
-    fn next_critical(&mut self, way: f64, before: usize) -> Result<Option<f64>, Failure> {
-        let load = self.stage.state.load;
-        let ahead = critical_loads(self.stage, before + 4)?;
-        Ok(ahead.into_iter().filter(|critical| (critical - load) * way > 0.0).nth(before))
     }
 
     /// The kind of the critical load just ahead of the present state: towards a limit point the
@@ -299,7 +291,7 @@ impl Buckling<'_, '_> {
         let (mut least_drift, mut steadiest) = (f64::INFINITY, None);
         for _ in 0..MOST_EXTRAPOLATIONS {
             let load = self.stage.state.load;
-            let Some(critical) = self.next_critical(way, before)? else { break };
+            let Some(critical) = next_critical_load(self.stage, way, before)? else { break };
             let now = Sight { from: load, critical };
             let drift = last.as_ref().map_or(f64::MAX, |last| now.drift_since(last));
             if drift < least_drift {

@@ -5,7 +5,7 @@ use crate::kernel::Weights;
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
 use crate::run::statics::PathDirection;
-use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, largest_eigenvalues, mechanism};
+use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, leading_eigenvalues_until, mechanism};
 use crate::sorting::sort_by;
 use crate::system::System;
 use crate::tensor::Vec3;
@@ -27,8 +27,32 @@ pub fn negative_pivots(stage: &mut StageRun) -> Option<usize> {
     newton.solver.negative_pivots(&mut Tangent::that_may_go(assembly, state, Weights::STIFFNESS))
 }
 
-/// The critical loads as they look from the present state.
+/// The critical loads as they look from the present state: so many, those above it first.
 pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Failure> {
+    let mut loads =
+        nearest_critical_loads(stage, modes, &|ahead| ahead.iter().filter(|&&ahead| ahead > 0.0).count() >= modes)?;
+    loads.truncate(modes);
+    Ok(loads)
+}
+
+/// The critical load with `before` others between it and the present one in the direction `way`, as it looks from
+/// here.
+pub fn next_critical_load(stage: &mut StageRun, way: f64, before: usize) -> Result<Option<f64>, Failure> {
+    let load = stage.state.load;
+    let lies_there = |ahead: f64| ahead * way > 0.0;
+    let loads = nearest_critical_loads(stage, before + 4, &|ahead| {
+        ahead.iter().filter(|&&ahead| lies_there(ahead)).count() > before
+    })?;
+    Ok(loads.into_iter().filter(|critical| lies_there(critical - load)).nth(before))
+}
+
+/// The critical loads nearest to the present one, as they look from the present state; those above it come first.
+/// There are so many that `is_enough`, which is given their distances from the present load, or `modes` and some more.
+fn nearest_critical_loads(
+    stage: &mut StageRun,
+    modes: usize,
+    is_enough: &dyn Fn(&[f64]) -> bool,
+) -> Result<Vec<f64>, Failure> {
     let Some(PathDirection { rate: direction, .. }) = stage.path_direction()? else { return Ok(Vec::new()) };
     let length = stage.model.length;
     let moving = direction.iter().zip(stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
@@ -52,13 +76,14 @@ pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Fa
     let symmetric = stable && model.multipliers.is_empty();
     let symmetric = symmetric && is_symmetric(&system.pattern, &varied);
     let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
-    let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default().values;
+    let is_real = |theta: &&Complex<f64>| theta.norm() > 0.0 && theta.im.abs() <= REAL * theta.norm();
+    let ahead =
+        |found: &[Complex<f64>]| -> Vec<f64> { found.iter().filter(is_real).map(|theta| 1.0 / theta.re).collect() };
+    let found = leading_eigenvalues_until(&mut operator, 4 * modes + 8, &|found| is_enough(&ahead(found)));
     let load = state.load;
     stage.unless_interrupted()?;
-    let real = |theta: &&Complex<f64>| theta.norm() > 0.0 && theta.im.abs() <= REAL * theta.norm();
-    let mut loads: Vec<f64> = found.iter().filter(real).map(|theta| load + 1.0 / theta.re).collect();
+    let mut loads: Vec<f64> = ahead(&found.unwrap_or_default()).into_iter().map(|ahead| load + ahead).collect();
     sort_by(&mut loads, |a, b| rank(*a, load).total_cmp(&rank(*b, load)));
-    loads.truncate(modes);
     Ok(loads)
 }
 
