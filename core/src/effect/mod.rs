@@ -216,8 +216,8 @@ impl Roles<'_> {
 
 /// The role of constraints: gaps that multipliers close, and motors that prescribe them.
 pub trait Constraint {
-    /// Writes first and second derivatives over time of the gaps, for a motion without
-    /// accelerations, by slot of the multipliers. A dynamic stage begins with velocities and
+    /// Writes first and second derivatives over time of the gaps, by slot of the multipliers, with
+    /// the velocities and accelerations of the state. A dynamic stage begins with velocities and
     /// accelerations that keep the gaps closed.
     fn drift(&self, at: &State, rates: &mut [Vec3], rates2: &mut [Vec3]);
 

@@ -188,11 +188,18 @@ impl Constraint for Sliders {
         for slider in &self.sliders {
             let now = self.now(slider, at);
             let guide = &self.guides[slider.guide].nodes[now.nodes.clone()];
-            let moving = guide.iter().map(|node| at.v[node.u as usize]).collect::<Vec<_>>();
-            let line = LinePoint::new(&now.weights, &moving);
-            let speed = at.v[slider.slide as usize].0[0];
-            rates[slider.force as usize] = at.v[slider.u as usize] - line.place - now.line.slope * speed;
-            rates2[slider.force as usize] = -(line.slope * 2.0 + now.line.curvature * speed) * speed;
+            let line_of = |rates: &[Vec3]| {
+                let of_nodes: Vec<Vec3> = guide.iter().map(|node| rates[node.u as usize]).collect();
+                LinePoint::new(&now.weights, &of_nodes)
+            };
+            let (line, line_rate) = (line_of(&at.v), line_of(&at.a));
+            let [speed, speed_rate] = [&at.v, &at.a].map(|rates| rates[slider.slide as usize].0[0]);
+            let (u, force) = (slider.u as usize, slider.force as usize);
+            rates[force] = at.v[u] - line.place - now.line.slope * speed;
+            rates2[force] = at.a[u]
+                - line_rate.place
+                - now.line.slope * speed_rate
+                - (line.slope * 2.0 + now.line.curvature * speed) * speed;
         }
     }
 

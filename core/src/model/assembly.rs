@@ -313,8 +313,9 @@ impl Assembly {
     /// see [`Constraint::drift`](crate::effect::Constraint::drift).
     pub fn drift(&self, state: &State) -> [Vec<Vec3>; 2] {
         let Some(linear) = &self.linear else { return self.drift_of_effects(state) };
-        // Gaps are linear in displacements: second derivatives are those of motors alone.
+        // Gaps are linear in displacements: velocities have no part in second derivatives.
         let mut origin = linear.origin_with_loads_of(state);
+        origin.a.copy_from(&state.a);
         let [_, rates2] = self.drift_of_effects(&origin);
         origin.v.copy_from(&state.v);
         let [rates, _] = self.drift_of_effects(&origin);

@@ -80,17 +80,17 @@ impl Joint {
         })
     }
 
-    /// The ends as functions of time, for a motion without accelerations.
+    /// The ends as functions of time.
     fn moving_ends(&self, at: &State) -> [End<Jet>; 2] {
-        let jet = |value: Vec3, rate: Vec3| {
-            Vec3(std::array::from_fn(|k| Jet { value: value.0[k], rate: rate.0[k], rate2: 0.0 }))
+        let jet = |value: Vec3, rate: Vec3, rate2: Vec3| {
+            Vec3(std::array::from_fn(|k| Jet { value: value.0[k], rate: rate.0[k], rate2: rate2.0[k] }))
         };
         std::array::from_fn(|k| match self.nodes[k] {
             Some(node) => {
                 let u = node.u as usize;
                 let p = node.p as usize;
-                let place = jet(self.places[k] + at.q[u], at.v[u]);
-                End { place, rotation: Rotation::new(jet(at.q[p], at.v[p])) }
+                let place = jet(self.places[k] + at.q[u], at.v[u], at.a[u]);
+                End { place, rotation: Rotation::new(jet(at.q[p], at.v[p], at.a[p])) }
             }
             None => End { place: Vec3::constant(self.places[k]), rotation: Rotation::new(Vec3::constant(Vec3::ZERO)) },
         })
@@ -150,7 +150,7 @@ impl Joint {
         Gaps { along: Vec3([0, 1, 2].map(|k| if closed[k] { along.0[k] } else { 0.0 })), between }
     }
 
-    /// The gaps with their first and second time derivatives, for a motion without accelerations.
+    /// The gaps with their first and second time derivatives.
     fn moving_gaps(&self, at: &State) -> Gaps<Jet> {
         let ends = self.moving_ends(at);
         let mut along = slides(&self.axes, &self.arms, &ends[0], &ends[1]);
