@@ -1,10 +1,12 @@
 //! Checks of contacts before their mechanics is built.
 
-use crate::deck::{Deck, Diagnostic, EffectWord, StageBody};
+use crate::deck::{Contact, Deck, Diagnostic, EffectWord, StageBody};
+use std::collections::HashMap;
 
 /// Refuses contacts that no stage can treat, and names that are given twice.
 pub fn check(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     refuse_shared_names(deck, diagnostics);
+    refuse_shared_pairs(deck, diagnostics);
     if deck.contacts.is_empty() || !deck.effects.allow(EffectWord::Contact) {
         return;
     }
@@ -30,6 +32,65 @@ pub fn check(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         let diagnostic = Diagnostic::error(message, stage.span.clone());
         let help = format!("give `{}` the `stages` in which it acts, without this one", contact.name.value);
         diagnostics.push(diagnostic.help(help).context(contact.name.span.clone(), "this contact"));
+    }
+}
+
+/// Two parties that a contact lets touch, by their names.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Pair<'a> {
+    /// A beam on a surface
+    BeamOnSurface(&'a str, &'a str),
+    /// A node on a surface
+    NodeOnSurface(&'a str, &'a str),
+    /// Two beams, in the order of their names
+    Beams(&'a str, &'a str),
+    /// A beam on itself
+    Itself(&'a str),
+}
+
+impl Pair<'_> {
+    fn in_words(self) -> String {
+        match self {
+            Self::BeamOnSurface(a, b) | Self::NodeOnSurface(a, b) | Self::Beams(a, b) => format!("`{a}` and `{b}`"),
+            Self::Itself(beam) => format!("`{beam}` with itself"),
+        }
+    }
+}
+
+/// The pairs of a contact.
+fn pairs(contact: &Contact) -> Vec<Pair<'_>> {
+    let [beams, nodes, surfaces, with] = [&contact.beams, &contact.nodes, &contact.surfaces, &contact.with]
+        .map(|list| list.iter().map(|name| name.value.as_str()).collect::<Vec<_>>());
+    let mut all = Vec::new();
+    for &surface in &surfaces {
+        all.extend(beams.iter().map(|beam| Pair::BeamOnSurface(beam, surface)));
+        all.extend(nodes.iter().map(|node| Pair::NodeOnSurface(node, surface)));
+    }
+    for &beam in &beams {
+        all.extend(with.iter().map(|&other| Pair::Beams(beam.min(other), beam.max(other))));
+        all.extend(contact.touches_itself.then_some(Pair::Itself(beam)));
+    }
+    all
+}
+
+/// Refuses two contacts of one pair in one stage: each would push.
+fn refuse_shared_pairs(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    let acts_in =
+        |contact: &Contact, stage: usize| contact.stages.as_ref().is_none_or(|stages| stages.contains(&stage));
+    let meet = |a: &Contact, b: &Contact| (1..=deck.stages.len()).any(|stage| acts_in(a, stage) && acts_in(b, stage));
+    let mut known: HashMap<Pair, Vec<&Contact>> = HashMap::new();
+    for contact in &deck.contacts {
+        let mut twice = None;
+        for pair in pairs(contact) {
+            let others = known.entry(pair).or_default();
+            twice = twice.or_else(|| others.iter().find(|other| meet(other, contact)).map(|other| (pair, *other)));
+            others.push(contact);
+        }
+        let Some((pair, other)) = twice else { continue };
+        let message = format!("the contact of {} is in two [[contact]] tables: it would count double", pair.in_words());
+        let diagnostic = Diagnostic::error(message, contact.name.span.clone());
+        let diagnostic = diagnostic.context(other.name.span.clone(), "the other one");
+        diagnostics.push(diagnostic.help("leave it out of one, or give the two different `stages`"));
     }
 }
 

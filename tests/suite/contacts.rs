@@ -1206,3 +1206,87 @@ fn wires_on_the_axis_of_straight_tubes_touch_nothing() {
         assert!((moved - exact).norm() < 1e-9 * half, "{case}: {moved:?}\n{text}");
     }
 }
+
+/// What touches at the start of a run has its forces in the first row, whatever the scheme, and has lasted no step.
+#[test]
+fn a_run_begins_with_the_forces_of_what_touches() {
+    for scheme in ["lobatto", "generalized_alpha", "lie_generalized_alpha", "hht", "newmark"] {
+        let run = simulate(&format!(
+            "gravity = [0, 0, -10]\n[point]\nb = [0, 0, \"0.1 - 1e-4\"]\n[[body]]\nat = \"b\"\nmass = 1\n\
+             [[initial]]\nat = \"b\"\nvelocity = [0, 0, 2]\n\
+             [[surface]]\nname = \"s\"\nkind = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n\
+             [[contact]]\nname = \"c\"\nnodes = [\"b\"]\nsurfaces = [\"s\"]\nradius = 0.1\nstiffness = 1e5\nfriction = 0.05\n\
+             penetration = 1e-3\n[[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 1e-3\nscheme = \"{scheme}\"\n\
+             [output]\ncolumns = [\"u\", \"contact\", \"energy\"]\n"
+        ));
+        let [force, points] = ["c.normal", "c.points"].map(|column| run.column(column)[0]);
+        assert!((force - 10.0).abs() < 1e-9 && points == 1.0, "{scheme}: {force}, {points}");
+        assert!(run.counters.findings.warnings.is_empty(), "{scheme}: {:?}", run.counters.findings.warnings);
+        assert!((run.end("b.uz") - (2.0 * 0.1 - 5.0 * 0.01)).abs() < 2e-3, "{scheme}: {}", run.end("b.uz"));
+    }
+}
+
+/// Beams that touch at the start have forces in the first row: as deep as they are.
+#[test]
+fn a_run_begins_with_the_forces_of_beams_that_touch() {
+    let run = simulate(
+        "[point]\na = [-1, 0, 0]\nb = [1, 0, 0]\nc = [0, -1, 0.199]\nd = [0, 1, 0.199]\n\
+         [section.s]\nEA = 1e7\nGA = 1e7\nGJ = 1e5\nEI = 1e5\nrhoA = 10\nrhoJ = [0.2, 0.1, 0.1]\n\
+         [[beam]]\nname = \"lower\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 3\n\
+         [[beam]]\nname = \"upper\"\nsection = \"s\"\nthrough = [\"c\", \"d\"]\nelements = 3\n\
+         [[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"b\"\nfix = \"all\"\n\
+         [[initial]]\nbeam = \"upper\"\nvelocity = [0, 4, 0]\n\
+         [[contact]]\nname = \"hit\"\nbeams = [\"upper\"]\nwith = [\"lower\"]\nradius = 0.1\nfriction = 0.2\nstiffness = 1e5\n\
+         penetration = 0.01\n[[stage]]\nkind = \"dynamic\"\nend = 1e-3\nstep = 1e-4\nscheme = \"generalized_alpha\"\n\
+         [output]\ncolumns = [\"contact\", \"energy\"]\n",
+    );
+    for (column, value) in [("hit.normal", 100.0), ("hit.fz", 100.0), ("hit.points", 1.0)] {
+        let found = run.column(column)[0];
+        assert!((found - value).abs() < 1e-6 * value.abs(), "{column}: {found} for {value}");
+    }
+}
+
+/// The end of a beam without caps does not touch what lies before it.
+#[test]
+fn ends_without_caps_hide_no_penetration() {
+    let run = simulate(
+        "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e5\nGA = 1e5\nGJ = 10\nEI = 10\n\
+         [[beam]]\nname = \"w\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 4\n[[support]]\nat = \"a\"\nfix = \"all\"\n\
+         [[surface]]\nname = \"f\"\nkind = \"plane\"\npoint = [1.021, 0, 0]\nnormal = [-1, 0, 0]\n\
+         [[contact]]\nname = \"c\"\nbeams = [\"w\"]\nsurfaces = [\"f\"]\nradius = 0.02\nends = \"none\"\n\
+         [[load]]\nat = \"b\"\nforce = [500, 0, 0]\n[[stage]]\nkind = \"static\"\nsteps = 2\n[output]\ncolumns = [\"u\", \"contact\"]\n",
+    );
+    assert!((run.end("b.ux") - 5e-3).abs() < 1e-6 && run.end("c.normal") == 0.0);
+    assert!(run.end("c.gap") > 0.2, "{}", run.end("c.gap"));
+    assert!(run.counters.findings.warnings.is_empty(), "{:?}", run.counters.findings.warnings);
+}
+
+/// In two tables a pair would push twice, unless they act in different stages. A beam and a surface may share a name.
+#[test]
+fn pairs_in_two_contacts_are_refused() {
+    let contact = |name: &str, keys: &str| format!("[[contact]]\nname = \"{name}\"\nradius = 0.1\n{keys}\n");
+    let deck = |first: &str, second: &str| {
+        format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [0, 0, 1]\nd = [1, 0, 1]\n[section.s]\nEA = 1\nGA = 1\nGJ = 1\nEI = 1\n\
+             [[beam]]\nname = \"v\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 2\n\
+             [[beam]]\nname = \"w\"\nsection = \"s\"\nthrough = [\"c\", \"d\"]\nelements = 2\n\
+             [[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"c\"\nfix = \"all\"\n\
+             [[surface]]\nname = \"w\"\nkind = \"plane\"\npoint = [0, 0, -9]\nnormal = [0, 0, 1]\n{}{}\
+             [[stage]]\nkind = \"static\"\nsteps = 1\n[[stage]]\nkind = \"static\"\nsteps = 1\n",
+            contact("one", first),
+            contact("two", second)
+        )
+    };
+    let [on_surface, on_beam] = ["beams = [\"v\"]\nsurfaces = [\"w\"]", "beams = [\"v\"]\nwith = [\"w\"]"];
+    let turned = "beams = [\"w\"]\nwith = [\"v\"]";
+    let itself = "beams = [\"v\"]\nself = true";
+    for (first, second) in [(on_surface, on_surface), (on_beam, turned), (itself, itself)] {
+        let found = refusal(&deck(first, second));
+        assert!(found.contains("is in two [[contact]] tables"), "{first}, {second}: {found}");
+        let apart = deck(&format!("{first}\nstages = [1]"), &format!("{second}\nstages = [2]"));
+        assert!(attempt(&apart).result.is_ok(), "{apart}");
+    }
+    for second in [on_beam, itself] {
+        assert!(attempt(&deck(on_surface, second)).result.is_ok());
+    }
+}

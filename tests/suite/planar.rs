@@ -605,3 +605,26 @@ fn sections_that_twist_under_loads_aside_of_the_plane_are_planar() {
     let text = frame(false, "relative", 1).replace(plain, coupled);
     agrees_with_space("channel", &format!("{text}[[load]]\nat = \"tip\"\nforce = [3, -8, 0]\n{STATIC}"));
 }
+
+/// A tilted box is no mirror image of itself, whatever edges are equal.
+#[test]
+fn boxes_with_equal_edges_are_planar_only_along_their_faces() {
+    let deck = |half: &str, tilt: f64| {
+        let (sine, cosine) = tilt.sin_cos();
+        format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e5\nGA = 1e5\nGJ = 10\nEI = 10\n[[beam]]\nname = \"w\"\n\
+             section = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 10\norder = 2\n[[support]]\nat = \"a\"\nfix = \"all\"\n\
+             [[load]]\nalong = \"w\"\nforce = [0, 0, -4]\n[[surface]]\nname = \"f\"\nkind = \"box\"\nat = [0.8, 0, -0.127]\n\
+             half = {half}\naxes = [[1, 0, 0], [0, {cosine}, {sine}]]\n[[contact]]\nname = \"c\"\nbeams = [\"w\"]\nsurfaces = [\"f\"]\n\
+             radius = 0.02\npenetration = 1e-4\n[[stage]]\nkind = \"static\"\nsteps = 2\n[output]\ncolumns = [\"u\", \"reaction\", \"contact\"]\n"
+        )
+    };
+    for half in ["[0.1, 0.1, 0.1]", "[0.2, 0.1, 0.1]", "[0.2, 0.11, 0.1]"] {
+        let (flat, ended, _) = run(&deck(half, 0.0));
+        ended.unwrap();
+        assert!(flat.planar, "{half}");
+        let (tilted, ended, _) = run(&deck(half, 0.1));
+        ended.unwrap();
+        assert!(!tilted.planar, "{half}");
+    }
+}

@@ -33,6 +33,10 @@ pub trait Contacts {
     /// Begins the penalty of dynamic stages, after a static one, with the forces of the multipliers.
     fn begin_penalty(&self, at: &mut State);
 
+    /// Writes the memory of a state in which a motion begins, where nothing is remembered of contacts yet: forces of
+    /// what touches, without friction.
+    fn begin_motion(&self, at: &mut State);
+
     /// Writes the memory of a state that is accepted after `before`.
     fn accept(&self, before: &State, at: &mut State);
 

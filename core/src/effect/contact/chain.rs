@@ -103,13 +103,15 @@ impl Chain {
         from + (to - from) * at.s
     }
 
-    /// The least gap of nodes and closest points; infinite where nothing is there to touch.
+    /// The least gap of nodes and closest points, without ends that do not touch; infinite where nothing is there to
+    /// touch.
     pub(super) fn least_gap(&self, surface: &Surface, carrier: &Carrier, at: &State) -> f64 {
         let places = self.seen(carrier, at);
         let gap = |place: Vec3| surface.value(place, self.radius).map_or(f64::INFINITY, |value| value - self.radius);
-        let nodes = places.iter().map(|place| gap(*place)).fold(f64::INFINITY, f64::min);
         let regime = ContactRegime::Augmented;
         let seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points: &[], regime };
+        let nodes = (0..seen.places.len()).filter(|&node| seen.touches(node)).map(|node| gap(seen.places[node]));
+        let nodes = nodes.fold(f64::INFINITY, f64::min);
         let elements = 0..if self.order == 0 { 0 } else { self.elements() };
         elements.flat_map(|k| seen.closest(k)).map(gap).fold(nodes, f64::min)
     }
@@ -422,7 +424,7 @@ impl SeenChain<'_> {
             if !is_candidate || (is_closed && k == last) {
                 continue;
             }
-            if order > 0 && !self.chain.has_caps && self.is_cap(k) {
+            if !self.touches(k) {
                 continue;
             }
             let s = if order == 0 { 0.0 } else { (k - to * order) as f64 / order as f64 };
@@ -437,6 +439,11 @@ impl SeenChain<'_> {
             ContactRegime::Augmented => 0.0,
             ContactRegime::Penalty => 1.0 - closest.weight * (1.0 - (closest.s - s).abs()),
         }
+    }
+
+    /// False for an end without a cap that faces the surface: its face does not touch.
+    fn touches(&self, k: usize) -> bool {
+        self.chain.order == 0 || self.chain.has_caps || !self.is_cap(k)
     }
 
     /// True if node `k` is an end of the chain that faces the surface.

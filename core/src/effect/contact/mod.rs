@@ -460,6 +460,16 @@ impl Contacts for SurfaceContacts {
         at.contacts.taken_over = Contacts::energy(self, at) - before;
     }
 
+    fn begin_motion(&self, at: &mut State) {
+        if at.contacts.touches() {
+            return;
+        }
+        self.remember(at, true);
+        // None of them has lasted a step.
+        self.change_points(at, |point, _| point.steps = 0);
+        at.contacts.damping_power = self.damping_power(at);
+    }
+
     fn accept(&self, before: &State, at: &mut State) {
         at.contacts.is_clear = self.is_clear(at);
         if at.contacts.is_clear && at.contacts.damping_power == 0.0 {

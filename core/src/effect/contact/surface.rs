@@ -132,9 +132,10 @@ impl SceneSurface {
                 show(MirrorData::Place(*centre));
                 show(MirrorData::Line(*axis));
             }
-            Shape::Box { centre, axes, half } => {
+            // A box whose edges are equal has more planes, in which it is simulated in space.
+            Shape::Box { centre, axes, .. } => {
                 show(MirrorData::Place(*centre));
-                show(MirrorData::Tensor(*axes * Mat3::diagonal(*half) * axes.transpose()));
+                (0..3).for_each(|k| show(MirrorData::Line(axes.column(k))));
             }
             Shape::Tube(_) | Shape::Mesh(_) => show(MirrorData::Spatial),
         }

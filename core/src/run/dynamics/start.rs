@@ -35,6 +35,9 @@ impl Dynamics<'_, '_> {
         // Time steps do not look out of the plane again.
         SpatialLook::default().refuse_loose(self.stage, step.weights())?;
         self.join_velocities(caught.as_deref())?;
+        if let Some(contacts) = self.stage.model.contacts() {
+            contacts.begin_motion(self.stage.state);
+        }
         self.solve_accelerations()?;
         self.settings.scheme.start(self.stage.state);
         if let Some(increments) = &self.increments {

@@ -25,7 +25,7 @@ const MARGIN_OF_ELEMENT: f64 = 0.1;
 const MARGIN_OF_MOTION: f64 = 2.5;
 
 /// Fast motions make the margin larger by this factor at most.
-const LARGEST_MARGIN: f64 = 8.0;
+const LARGEST_MARGIN: f64 = 2.0;
 
 /// A list is made anew when a node has moved by this part of the margin.
 const OLD: f64 = 0.25;
