@@ -1,8 +1,10 @@
 //! Modes against closed forms.
 
 use crate::random::Random;
-use crate::scenes::{list, modes};
+use crate::scenes::{attempt, list, modes};
+use beamsim_core::run::Mode;
 use beamsim_core::tensor::Vec3;
+use nalgebra::{Complex, DMatrix};
 
 /// A body on a hinge with a spring and a damper, in a frame that turns about an axis beside the hinge.
 struct Hinged {
@@ -93,5 +95,144 @@ fn double_modes_are_listed_twice_with_damping() {
             assert!((with.omega / expected - 1.0).abs() < 1e-6, "{case}: {} for {expected}", with.omega);
             assert!((with.growth + 0.05).abs() < 1e-6, "{case}: {with:?}");
         }
+    }
+}
+
+/// Two masses on a spring, the first on a dashpot, along one direction in which nothing else holds them: the exponents but for zero are the
+/// roots of m M s^3 + c M s^2 + k (m + M) s + c k.
+fn braked(masses: [f64; 2], dashpot: f64, stiffness: f64) -> Vec<Complex<f64>> {
+    let [m, heavy] = masses;
+    let lead = m * heavy;
+    let [a, b, c] = [dashpot * heavy / lead, stiffness * (m + heavy) / lead, dashpot * stiffness / lead];
+    let companion = DMatrix::from_row_slice(3, 3, &[0.0, 0.0, -c, 1.0, 0.0, -b, 0.0, 1.0, -a]);
+    companion.complex_eigenvalues().iter().copied().filter(|root| root.im >= 0.0).collect()
+}
+
+fn exponents(modes: &[Mode]) -> Vec<Complex<f64>> {
+    modes.iter().map(|mode| Complex::new(mode.growth, mode.omega)).collect()
+}
+
+/// Each is found among the others, as often as it is there.
+fn assert_same(mut found: Vec<Complex<f64>>, expected: &[Complex<f64>], what: &str) {
+    let size = expected.iter().map(|s| s.norm()).fold(0.0, f64::max);
+    assert_eq!(found.len(), expected.len(), "{what}: {found:?}, not {expected:?}");
+    for one in expected {
+        let near = |other: &Complex<f64>| (other - one).norm() < 1e-7 * size;
+        let place =
+            found.iter().position(near).unwrap_or_else(|| panic!("{what}: no {one} in {found:?}, of {expected:?}"));
+        found.swap_remove(place);
+    }
+}
+
+/// Free motions that dashpots resist, along random directions: nothing is missing, and each has its decay.
+#[test]
+fn modes_are_complete_where_dashpots_alone_hold_something() {
+    let mut random = Random::new(43);
+    for case in 0..40 {
+        let mut power = |low: f64, high: f64| 10f64.powf(random.range(low, high));
+        let masses = [power(-1.0, 1.0), power(-1.0, 1.0)];
+        let stiffness = power(0.0, 3.0);
+        let critical = 2.0 * (stiffness * masses[0]).sqrt();
+        let dashpots = [power(-6.0, 1.0), power(-3.0, 0.5), power(-2.0, 0.3)].map(|ratio| ratio * critical);
+        // Some directions are without any.
+        let dashpots: [f64; 3] = std::array::from_fn(|k| if (case >> k) % 4 == 3 { 0.0 } else { dashpots[k] });
+        let axis = random.direction();
+        let aside = axis.cross(random.direction()).normalized().unwrap();
+        // Where no node turns, a single element is a spring of EA/L along it and of GA/L across.
+        let text = format!(
+            "[point]\na = [0, 0, 0]\nb = {}\n[[body]]\nat = \"a\"\nmass = {}\n[[body]]\nat = \"b\"\nmass = {}\n\
+             [section.s]\nEA = {stiffness}\nGA = {stiffness}\nGJ = 1\nEI = 1\n[[beam]]\nname = \"s\"\nsection = \"s\"\n\
+             through = [\"a\", \"b\"]\nelements = 1\n[[support]]\nat = \"a\"\nfix = [\"rx\", \"ry\", \"rz\"]\n\
+             [[support]]\nat = \"b\"\nfix = [\"rx\", \"ry\", \"rz\"]\n\
+             [[spring]]\nat = \"a\"\naxes = [{}, {}]\ndamping = [{}, {}, {}, 0, 0, 0]\n\
+             [[stage]]\nkind = \"modal\"\nmodes = 20\n",
+            list(random.direction()),
+            masses[0],
+            masses[1],
+            list(axis),
+            list(aside),
+            dashpots[0],
+            dashpots[1],
+            dashpots[2]
+        );
+        let zero = Complex::default();
+        let swing = Complex::new(0.0, (stiffness * (1.0 / masses[0] + 1.0 / masses[1])).sqrt());
+        let of_direction = |&dashpot: &f64| match dashpot {
+            0.0 => vec![zero, swing],
+            dashpot => [vec![zero], braked(masses, dashpot, stiffness)].concat(),
+        };
+        let expected: Vec<Complex<f64>> = dashpots.iter().flat_map(of_direction).collect();
+        assert_same(exponents(&modes(&text)), &expected, &format!("{case}: {dashpots:?}\n{text}"));
+    }
+}
+
+/// Damping by mass brakes the rigid motions of a free beam, each with its rate.
+#[test]
+fn free_beams_that_mass_damps_have_the_decay_of_their_rigid_motions() {
+    let found = modes(
+        "[point]\na = [0, 0, 0]\nb = [1, 0.2, 0.3]\n[section.s]\nEA = 1e4\nGA = 4e3\nGJ = 3\nEI = 4\nrhoA = 1\nrhoJ = [0.02, 0.01, 0.01]\n\
+         [[beam]]\nname = \"f\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 4\n[damping]\nmass = 0.05\n\
+         [[stage]]\nkind = \"modal\"\nmodes = 14\n",
+    );
+    let found = exponents(&found);
+    let count = |value: f64| found.iter().filter(|s| s.im == 0.0 && (s.re - value).abs() < 1e-8).count();
+    assert_eq!([count(0.0), count(-0.05)], [6, 6], "{found:?}");
+    assert!(found.iter().filter(|s| s.im > 0.0).all(|s| (s.re + 0.025).abs() < 1e-8), "{found:?}");
+}
+
+/// Rotations take part, parts are of unlike mass, and round-off of other dampers is none.
+#[test]
+fn damped_rigid_motions_of_bodies_and_beams_are_complete() {
+    // A body on a dashpot beside its centre: m u'' + c u' = 0 about the point that neither moves nor turns.
+    let body = "[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 1\ninertia = [0.2, 0.2, 0.2]\noffset = [0.5, 0, 0]\n\
+                [[spring]]\nat = \"a\"\ndamping = [0, 0, 0.05, 0, 0, 0]\n[[stage]]\nkind = \"modal\"\nmodes = 14\n";
+    let found = exponents(&modes(body));
+    let decays: Vec<f64> = found.iter().map(|s| s.re).filter(|re| *re != 0.0).collect();
+    // 1/m + x^2/I at the dashpot.
+    assert!(decays.len() == 1 && (decays[0] + 0.05 * (1.0 + 0.25 / 0.2)).abs() < 1e-10, "{found:?}");
+    let beam = |ea: f64, elements: usize, more: &str| {
+        exponents(&modes(&format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0.2, 0.3]\n[section.s]\nEA = {ea}\nGA = 4e3\nGJ = 3\nEI = 4\nrhoA = 1\n\
+             rhoJ = [0.02, 0.01, 0.01]\n[[beam]]\nname = \"f\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = {elements}\n\
+             {more}[[stage]]\nkind = \"modal\"\nmodes = 14\n"
+        )))
+    };
+    // With a dashpot on an end, modes move little from those without.
+    let dashpot = |c: f64| format!("[[spring]]\nat = \"a\"\ndamping = [{c}, {c}, {c}, 0, 0, 0]\n");
+    let swings = |found: &[Complex<f64>]| found.iter().filter(|s| s.im > 1.0).map(|s| s.im).collect::<Vec<_>>();
+    let (without, with) = (swings(&beam(1e4, 4, "")), swings(&beam(1e4, 4, &dashpot(0.05))));
+    assert!(with.len() >= 4, "{with:?}");
+    for (a, b) in without.iter().zip(&with) {
+        assert!((a / b - 1.0).abs() < 1e-2, "{without:?}, {with:?}");
+    }
+    // Beside large damping by stiffness that by mass is small.
+    let found = beam(1e5, 20, "[damping]\nmass = 1e-3\nstiffness = 1e-4\n");
+    // Round-off may make a pair of two of them.
+    let decays = found.iter().filter(|s| (*s + Complex::from(1e-3)).norm() < 2e-5).count();
+    assert!(decays >= 5 && found.iter().all(|s| s.re <= 0.0), "{found:?}");
+    assert!(found.iter().any(|s| (s.im - 32.97).abs() < 0.01), "{found:?}");
+    // Numbers without a square come to an end, whatever it is.
+    attempt(&body.replace("0.05", "1e308"));
+}
+
+/// A free beam that spins in a frame: what Coriolis forces couple with its free motions is listed as it was.
+#[test]
+fn free_beams_in_rotating_frames_keep_their_modes() {
+    let found = |damping: &str| {
+        exponents(&modes(&format!(
+            "[point]\na = [-1, 0, 0]\no = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e4\nGA = 4e3\nGJ = 3\nEI = 4\nrhoA = 1\n\
+             rhoJ = [0.02, 0.01, 0.01]\n[[beam]]\nname = \"f\"\nsection = \"s\"\nthrough = [\"a\", \"o\", \"b\"]\nelements = 4\n{damping}\
+             [[support]]\nat = \"o\"\nfix = \"all\"\nstages = [1]\n\
+             [[stage]]\nkind = \"static\"\nsteps = 4\ntolerance = 1e-12\nframe = {{ spin = [0, 0, 3] }}\n\
+             [[stage]]\nkind = \"modal\"\nmodes = 14\nframe = {{ spin = [0, 0, 3] }}\n"
+        )))
+    };
+    let without = found("");
+    let elastic = || without.iter().filter(|s| s.im > 5.0);
+    assert!(without.len() == 14 && elastic().all(|s| s.re.abs() < 1e-4), "{without:?}");
+    assert!((elastic().map(|s| s.im).fold(f64::INFINITY, f64::min) - 11.496184).abs() < 1e-5, "{without:?}");
+    let with = found("[damping]\nstiffness = 1e-6\n");
+    for one in elastic() {
+        assert!(with.iter().any(|s| (s.im - one.im).abs() < 1e-3 * one.im), "{one}: {with:?}");
     }
 }

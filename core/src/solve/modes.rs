@@ -7,7 +7,7 @@ use super::pivots::is_symmetric;
 use super::softest::lost_part;
 use crate::interrupt;
 use crate::system::{Pattern, Symmetry, System};
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
 /// A rigid motion is linearly dependent on others if orthogonalisation reduces it to this part of
 /// its norm.
@@ -27,11 +27,20 @@ const MAX_ENERGY_IMBALANCE: f64 = 1e-6;
 /// displacements in lengths of the scene and rotations in radians.
 const NEGLIGIBLE_DAMPING_RATIO: f64 = 1e-14;
 
+/// Damping r.C r of a rigid motion below this part of the sum of its terms is round-off.
+const NEGLIGIBLE_RATE: f64 = 1e-12;
+
+/// Sweeps for the eigenvalues of a small symmetric matrix, at most.
+const MOST_EIGENVALUE_SWEEPS: usize = 1000;
+
 /// Inverse iterations after which the slowest motion prevails.
 const INVERSE_ITERATIONS: usize = 3;
 
 /// Number of exponents of a rough estimate that are nearly right.
 const ROUGH_EXPONENTS: usize = 6;
+
+/// The imaginary part of a decay in a rough estimate, over its size.
+const ROUGHLY_REAL: f64 = 1e-3;
 
 /// Eigenvalues of a rough estimate below this part of the largest are round-off.
 const SMALLEST_ROUGH_PART: f64 = 1e-15;
@@ -112,6 +121,15 @@ impl ProblemForm {
     }
 }
 
+/// Rigid motions R that dampers slow down: K R = 0, and R.C R has a positive definite symmetric part.
+#[derive(Default)]
+struct DampedRigidMotions {
+    /// Orthonormal in M
+    motions: Vec<Vec<f64>>,
+    /// The inverse of R.C R
+    inverse: DMatrix<f64>,
+}
+
 /// The eigenvalue problem of a state.
 pub struct ModeSearch<'a> {
     /// System whose values become K + shift C + shift^2 M
@@ -121,9 +139,11 @@ pub struct ModeSearch<'a> {
     form: ProblemForm,
     /// Equations of multipliers
     multipliers: Vec<usize>,
-    /// Orthonormal rigid motions of free parts, and M times each; all vectors are orthogonal to
-    /// them
+    /// Orthonormal rigid motions of free parts that nothing damps, and M times each; all vectors are
+    /// orthogonal to them
     rigid: Vec<[Vec<f64>; 2]>,
+    /// Rigid motions that dampers resist
+    damped_rigid: DampedRigidMotions,
     shift: f64,
     /// True if the system and its factors are those of the shift
     is_ready: bool,
@@ -204,18 +224,72 @@ impl<'a> ModeSearch<'a> {
             form,
             multipliers,
             rigid: Vec::new(),
+            damped_rigid: DampedRigidMotions::default(),
             shift: 0.0,
             is_ready: false,
             negative: None,
             factorisations: 0,
         };
         rigid.into_iter().for_each(|motion| search.take_out(motion));
+        // Only where K is symmetric is r.K = 0, as r.(C x + M s x) = 0 needs it.
+        if damped && symmetric && form == ProblemForm::General {
+            search.split_off_damped();
+        }
         search
     }
 
     /// Number of linearly independent rigid motions.
     pub fn rigid(&self) -> usize {
-        self.rigid.len()
+        self.rigid.len() + self.damped_rigid.motions.len()
+    }
+
+    /// Splits rigid motions that dampers slow down off the others. Round-off of r.C r is told from damping by the sum of
+    /// its terms.
+    fn split_off_damped(&mut self) {
+        let count = self.rigid.len();
+        if count == 0 {
+            return;
+        }
+        let [damping, sizes]: [Vec<f64>; 2] =
+            [self.matrices.damping.clone(), self.matrices.damping.iter().map(|c| c.abs()).collect()];
+        let products = |values: &[f64], motions: &[Vec<f64>]| {
+            let images: Vec<Vec<f64>> = motions.iter().map(|motion| self.system.multiply(values, motion)).collect();
+            DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i], &images[j]))
+        };
+        let all: Vec<Vec<f64>> = self.rigid.iter().map(|[motion, _]| motion.clone()).collect();
+        let rates = products(&damping, &all);
+        let rates = (&rates + rates.transpose()) * 0.5;
+        let in_sizes: Vec<Vec<f64>> = all.iter().map(|motion| motion.iter().map(|x| x.abs()).collect()).collect();
+        let terms = products(&sizes, &in_sizes);
+        if terms.iter().any(|term| !term.is_finite()) {
+            return;
+        }
+        let Some(SymmetricEigen { eigenvalues, eigenvectors }) =
+            SymmetricEigen::try_new(rates, f64::EPSILON, MOST_EIGENVALUE_SWEEPS)
+        else {
+            return;
+        };
+        let is_damped = |k: &usize| {
+            let parts = eigenvectors.column(*k).abs();
+            eigenvalues[*k] > NEGLIGIBLE_RATE * (parts.transpose() * &terms * &parts)[0]
+        };
+        let (damped, free): (Vec<usize>, Vec<usize>) = (0..count).partition(is_damped);
+        if damped.is_empty() {
+            return;
+        }
+        let combine = |k: &usize, which: usize| {
+            let mut sum = vec![0.0; all[0].len()];
+            for (factor, parts) in eigenvectors.column(*k).iter().zip(&self.rigid) {
+                sum.iter_mut().zip(&parts[which]).for_each(|(sum, part)| *sum += factor * part);
+            }
+            sum
+        };
+        let motions: Vec<Vec<f64>> = damped.iter().map(|k| combine(k, 0)).collect();
+        // Its symmetric part is positive definite.
+        if let Some(inverse) = products(&damping, &motions).try_inverse() {
+            self.rigid = free.iter().map(|k| [combine(k, 0), combine(k, 1)]).collect();
+            self.damped_rigid = DampedRigidMotions { motions, inverse };
+        }
     }
 
     /// Orthonormalises a rigid motion and adds it, unless it is linearly dependent on the others.
@@ -239,6 +313,26 @@ impl<'a> ModeSearch<'a> {
         for [motion, weighed] in &self.rigid {
             let along = dot(weighed, x);
             x.iter_mut().zip(motion).for_each(|(x, r)| *x -= along * r);
+        }
+    }
+
+    /// Takes the rigid motions out of the image of an operator of double size, (x, s x/e). A rigid motion r that
+    /// nothing damps has the exponent 0 twice, and r.M x = 0 holds for all others. One that is damped has it once, with
+    /// (r, 0); all others have r.(C x + M s x) = 0.
+    fn project_doubled(&self, x: &mut [f64], second: &mut [f64]) {
+        self.project(x);
+        self.project(second);
+        let DampedRigidMotions { motions, inverse } = &self.damped_rigid;
+        if motions.is_empty() {
+            return;
+        }
+        let mut impulse = self.system.multiply(&self.matrices.damping, x);
+        let momentum = self.system.multiply(&self.matrices.mass, second);
+        impulse.iter_mut().zip(&momentum).for_each(|(impulse, momentum)| *impulse += self.shift * momentum);
+        let along: Vec<f64> = motions.iter().map(|motion| dot(motion, &impulse)).collect();
+        for (k, motion) in motions.iter().enumerate() {
+            let part = dot(inverse.row(k).iter().copied().collect::<Vec<f64>>().as_slice(), &along);
+            x.iter_mut().zip(motion).for_each(|(x, r)| *x -= part * r);
         }
     }
 
@@ -339,8 +433,16 @@ impl<'a> ModeSearch<'a> {
         // Only the first few are nearly right.
         let largest = values.iter().map(|theta| theta.norm()).fold(0.0, f64::max);
         let is_there = |theta: &Complex<f64>| theta.norm() > SMALLEST_ROUGH_PART * largest;
-        let there = values.into_iter().filter(is_there).take(ROUGH_EXPONENTS);
-        Some(there.map(|theta| form.exponent(shift, theta).norm()).collect())
+        // Decays of damped rigid motions may be far slower than all else, and would draw the shift to where digits are lost.
+        let mut decays = self.damped_rigid.motions.len();
+        let there = values.into_iter().filter(is_there).take(ROUGH_EXPONENTS + decays);
+        let mut exponents: Vec<Complex<f64>> = there.map(|theta| form.exponent(shift, theta)).collect();
+        exponents.retain(|s| {
+            let is_decay = decays > 0 && s.re < 0.0 && s.im.abs() <= ROUGHLY_REAL * s.norm();
+            decays -= usize::from(is_decay);
+            !is_decay
+        });
+        Some(exponents.into_iter().map(|s| s.norm()).collect())
     }
 
     /// See [`ModeOperator::diagonal`].
@@ -501,8 +603,13 @@ impl<'a> ModeSearch<'a> {
         let all: f64 = terms.iter().map(|term| term.norm()).sum();
         let balances = (terms[0] + terms[1] + terms[2]).norm() <= (MAX_ENERGY_IMBALANCE + 10.0 * uncertainty) * all;
         let is_free = exponent.norm() <= FREE_MOTION_RATIO * self.shift;
-        // s is proportional to the root of K.
-        let uncertainty = if is_free { 0.0 } else { 0.5 * uncertainty };
+        // d(m s^2 + c s + k) = 0: what round-off changes k by moves s by dk/(2 m s + c).
+        let moved = (terms[0] * 2.0 + terms[1]).norm();
+        let share = match self.form {
+            ProblemForm::Symmetric | ProblemForm::Undamped => 0.5,
+            ProblemForm::Gyroscopic | ProblemForm::General => (terms[2].norm() / moved).min(1.0),
+        };
+        let uncertainty = if is_free { 0.0 } else { share * uncertainty };
         let is_asked_for = self.form == ProblemForm::Symmetric && uncertainty > MAX_UNCERTAINTY;
         let shape = is_asked_for.then_some(ModeShape { unknowns: re, mass: mass.re });
         (balances || is_free).then_some(SmallMotion { exponent, uncertainty, shape })
@@ -568,8 +675,7 @@ impl Operator for ModeOperator<'_, '_> {
             return None;
         }
         let mut second: Vec<f64> = out.iter().zip(r1).map(|(x, r)| x + r / e).collect();
-        self.search.project(&mut out);
-        self.search.project(&mut second);
+        self.search.project_doubled(&mut out, &mut second);
         out.extend(second);
         Some(out)
     }

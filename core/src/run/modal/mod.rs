@@ -48,7 +48,7 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
         let found = self.find(&matrices)?;
         let mut listed = listed(&found, self.modes);
         if listed.is_empty() && self.modes > 0 {
-            return Err(self.not_found());
+            return Err(self.nothing_moves());
         }
         for motion in &mut listed {
             self.stage.unless_interrupted()?;
@@ -133,6 +133,12 @@ impl Modal<'_, '_> {
         self.stage.moment().limit(why)
     }
 
+    fn nothing_moves(&self) -> Failure {
+        let why = "there are no modes: supports, joints and motors leave no motion to what has mass (or stiffnesses and \
+                   masses are near the limits of floating-point numbers)";
+        self.stage.moment().limit(why)
+    }
+
     /// Refuses motions that neither stiffness nor mass holds.
     fn refuse_massless_mechanisms(&mut self, matrices: &Matrices) -> Result<(), Failure> {
         let StageRun { assembly, newton, model, state, counters, .. } = &mut *self.stage;
@@ -208,7 +214,8 @@ fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
 }
 
 fn mode(motion: &SmallMotion) -> Mode {
-    Mode { omega: motion.exponent.im, growth: motion.exponent.re }
+    // No zero has a sign.
+    Mode { omega: motion.exponent.im + 0.0, growth: motion.exponent.re + 0.0 }
 }
 
 /// By frequency; of equal frequencies the more unstable first.
