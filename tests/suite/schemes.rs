@@ -10,6 +10,7 @@ use beamsim_core::run::InitialMotion;
 use beamsim_core::solve::{Convergence, LinearSolver, Newton, Work};
 use beamsim_core::system::State;
 use beamsim_core::tensor::{Mat3, Vec3};
+use beamsim_core::warning::WarningKind;
 
 const SCHEMES: [&str; 7] = [
     "scheme = \"lie_generalized_alpha\"",
@@ -928,4 +929,154 @@ fn drives_of_sliders_do_the_work_that_moves_their_beads() {
         let [kinetic, total] = ["energy.kinetic", "energy.total"].map(|column| simulation.end(column));
         assert!(total.abs() < 3e-3 * kinetic, "{elements}: {total} of {kinetic}");
     }
+}
+
+const NAMES: [&str; 5] = ["lobatto", "generalized_alpha", "lie_generalized_alpha", "hht", "newmark"];
+
+/// Of a part that is driven at its node, a motor's history begins with an acceleration: what a joint fastens to it has it, too.
+#[test]
+fn what_is_fastened_to_a_driven_node_is_accelerated_with_it() {
+    let pushed = [
+        "[[joint]]\nkind = \"prismatic\"\nnodes = [\"a\"]\naxis = [0.6, 0, 0.8]\ndisplacement = 1\nhistory = \"h\"\n",
+        "[[motion]]\nat = \"a\"\nux = 0.6\nhistory = \"h\"\n[[motion]]\nat = \"a\"\nuz = 0.8\nhistory = \"h\"\n[[support]]\nat = \"a\"\nfix = [\"uy\", \"rx\", \"ry\", \"rz\"]\n",
+    ];
+    for (scheme, push) in NAMES.into_iter().flat_map(|scheme| pushed.map(|push| (scheme, push))) {
+        let run = simulate(&format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[[body]]\nat = \"a\"\nmass = 2\ninertia = [1, 1, 1]\n\
+             [[body]]\nat = \"b\"\nmass = 3\ninertia = [1, 1, 1]\n[history.h]\nexpr = \"1 - cos(2*t)\"\n\
+             {push}[[joint]]\nkind = \"rigid\"\nnodes = [\"a\", \"b\"]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.005\nscheme = \"{scheme}\"\n\
+             [output]\ncolumns = [\"a\", \"reaction\"]\n"
+        ));
+        let [of_b, force] = ["b.az", "a.fz"].map(|column| run.column(column));
+        assert!((of_b[0] - 3.2).abs() < 1e-12 && (force[0] - 16.0).abs() < 1e-11, "{scheme}: {of_b:?} {force:?}");
+        if scheme == "lobatto" {
+            let exact = |k: usize| 3.2 * f64::cos(0.01 * k as f64);
+            let off = |(k, a): (usize, &f64)| (a - exact(k)).abs();
+            let off = of_b.iter().enumerate().map(off).fold(0.0, f64::max);
+            assert!(off < 1e-10 && (run.end("a.fz") - 5.0 * exact(20)).abs() < 1e-9, "{off:e} {}", run.end("a.fz"));
+        }
+    }
+}
+
+/// A motor at the node of its crank, or beside it: one joint is a support of the node, the other has multipliers.
+#[test]
+fn motors_at_nodes_and_beside_them_drive_alike() {
+    for scheme in ["lobatto", "generalized_alpha"] {
+        let damping = if scheme == "lobatto" { "" } else { "rho_inf = 0.5\n" };
+        let [at_node, beside] = ["", "at = [0, 0, 0.3]\n"].map(|at| {
+            simulate(&format!(
+                "[point]\nshaft = [0, 0, 0]\nrod = [0.8, 0, 0]\nslider = [1.3, 0, 0]\n\
+                 [[body]]\nat = \"shaft\"\nmass = 1\ninertia = [0.01, 0.01, 0.01]\noffset = [0.15, 0, 0]\n\
+                 [[body]]\nat = \"rod\"\nmass = 2\ninertia = [0.17, 0.17, 0.17]\n\
+                 [[body]]\nat = \"slider\"\nmass = 3\ninertia = [0.1, 0.1, 0.1]\n\
+                 [[joint]]\nkind = \"revolute\"\nnodes = [\"shaft\"]\n{at}axis = [0, 0, 1]\nangle = 1\nhistory = \"h\"\n\
+                 [[joint]]\nkind = \"universal\"\nnodes = [\"shaft\", \"rod\"]\nat = [0.3, 0, 0]\naxes = [[0, 0, 1], [0, 1, 0]]\n\
+                 [[joint]]\nkind = \"spherical\"\nnodes = [\"rod\", \"slider\"]\nat = \"slider\"\n\
+                 [[joint]]\nkind = \"prismatic\"\nnodes = [\"slider\"]\naxis = [1, 0, 0]\n\
+                 [history.h]\nexpr = \"3 * t^2\"\n\
+                 [[stage]]\nkind = \"dynamic\"\nend = 0.5\nstep = 0.005\nscheme = \"{scheme}\"\n{damping}\
+                 [output]\nnodes = [\"shaft\", \"rod\", \"slider\"]\ncolumns = [\"a\", \"alpha\", \"energy\"]\n"
+            ))
+        });
+        for column in ["slider.ax", "rod.ay", "rod.alphaz", "energy.external"] {
+            let [one, other] = [&at_node, &beside].map(|run| run.column(column));
+            let size = other.iter().fold(0.0_f64, |most, a| most.max(a.abs()));
+            let off = one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(size > 0.1 && off < 1e-6 * size, "{scheme}, {column}: {off:e} of {size}");
+        }
+    }
+}
+
+/// A bead that is driven along a heavy beam has the acceleration of its drive from the first row on.
+#[test]
+fn beads_are_accelerated_with_their_drives() {
+    for scheme in NAMES {
+        let run = simulate(&format!(
+            "[point]\na = [0, 0, 0]\nb = [0, 0, 4]\nc = [0, 0, 0.5]\n[section.s]\nEA = 1e5\nGA = 1e5\nGJ = 1e3\nEI = 1e3\nrhoA = 1e9\n\
+             [history.h]\nexpr = \"t^2\"\n[[beam]]\nname = \"w\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 4\n\
+             [[body]]\nat = \"c\"\nmass = 1\n[[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"b\"\nfix = \"all\"\n\
+             [[slider]]\nnodes = [\"c\"]\non = \"w\"\ndisplacement = 1.5\nhistory = \"h\"\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.01\nstep = 0.01\nscheme = \"{scheme}\"\n\
+             [output]\nnodes = [\"c\"]\ncolumns = [\"a\"]\n"
+        ));
+        let first = run.column("c.az")[0];
+        assert!((first - 3.0).abs() < 1e-6, "{scheme}: {first}");
+    }
+}
+
+/// A frame of two bodies that joints let not move at all, under a load that comes slowly: its energies are round-off.
+#[test]
+fn what_cannot_move_gains_no_energy() {
+    for scheme in NAMES {
+        let run = simulate(&format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0.3, 0]\n[[body]]\nat = \"a\"\nmass = 1\ninertia = [0.1, 0.1, 0.1]\n\
+             [[body]]\nat = \"b\"\nmass = 1\ninertia = [0.1, 0.1, 0.1]\n\
+             [[joint]]\nkind = \"revolute\"\nnodes = [\"a\"]\nat = [-0.5, 0.1, 0]\naxis = [0, 0, 1]\n\
+             [[joint]]\nkind = \"spherical\"\nnodes = [\"b\"]\nat = [1.7, 0.1, 0.2]\n\
+             [[joint]]\nkind = \"universal\"\nnodes = [\"a\", \"b\"]\nat = [0.45, 0.6, 0.1]\naxes = [[0, 0, 1], [1, 0, 0]]\n\
+             [[load]]\nat = \"b\"\nforce = [3, -5, 2]\nhistory = \"h\"\n[history.h]\nexpr = \"sin(3*t)\"\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.2\nstep = 0.002\nscheme = \"{scheme}\"\n[output]\ncolumns = [\"u\", \"energy\"]\n"
+        ));
+        let told = &run.counters.findings.warnings;
+        assert!(told.iter().all(|warning| warning.kind == WarningKind::UndampedMultipliers), "{scheme}: {told:?}");
+        assert!(run.vector("b.u").iter().all(|u| u.abs() < 1e-12), "{scheme}");
+    }
+}
+
+/// A sudden load on links that are next to rigid: steps do not resolve what it sets going, and damping takes it away.
+#[test]
+fn sudden_loads_on_stiff_linkages_end_no_run() {
+    let link = |name: &str, ends: &str| {
+        format!(
+            "[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = {ends}\nelements = 2\norder = 2\naxis3 = [0, 0, 1]\n"
+        )
+    };
+    let hinge = |at: &str, beams: &str, more: &str| {
+        format!("[[joint]]\nkind = \"revolute\"\nat = \"{at}\"\nbeams = {beams}\naxis = [0, 0, 1]\n{more}")
+    };
+    for scheme in ["generalized_alpha\"\nrho_inf = 0.6 #", "hht"] {
+        let text = [
+            "gravity = [-3.8, -0.97, 0]\n[point]\nO = [0, 0, 0]\nA = [-0.162, -0.185, 0]\nB = [0.314, -0.543, 0]\nC = [0.482, 0, 0]\n\
+             [section.s]\nEA = 1e7\nGA = 1e7\nGJ = 1e7\nEI = 1e7\nrhoA = 0.7\nrhoJ = [0.002, 0.001, 0.001]\n"
+                .to_string(),
+            link("crank", "[\"O\", \"A\"]"),
+            link("coupler", "[\"B\", \"A\"]"),
+            link("rocker", "[\"C\", \"B\"]"),
+            hinge("O", "[\"crank\"]", "angle = 2.2\nhistory = \"h\"\n"),
+            hinge("A", "[\"crank\", \"coupler\"]", "damping = 1.5\n"),
+            hinge("B", "[\"coupler\", \"rocker\"]", "stiffness = 1.7\n"),
+            hinge("C", "[\"rocker\"]", ""),
+            "[[load]]\nat = \"rocker@end\"\nforce = [2.8, 0.39, 0]\n[[load]]\nat = \"rocker@end\"\nmoment = [0, 0, 2.2]\nframe = \"body\"\n\
+             [[body]]\nat = \"coupler@0.5\"\nmass = 0.68\n[history.h]\nexpr = \"(t*2.9)^4/(1 + (t*2.9)^4)\"\n"
+                .to_string(),
+            format!(
+                "[[stage]]\nkind = \"dynamic\"\nend = 0.8\nstep = 0.002\nscheme = \"{scheme}\"\n[output]\nnodes = [\"A\"]\ncolumns = [\"x\"]\n"
+            ),
+        ]
+        .concat();
+        let run = simulate(&text);
+        let turned = {
+            let s = (0.8f64 * 2.9).powi(4);
+            2.2 * s / (1.0 + s)
+        };
+        let (sine, cosine) = turned.sin_cos();
+        let expected = [-0.162 * cosine + 0.185 * sine, -0.162 * sine - 0.185 * cosine, 0.0];
+        let found = run.vector("A.");
+        assert!(distance(found, expected) < 1e-4, "{scheme}: {found:?} for {expected:?}");
+    }
+}
+
+/// A motor that starts from rest by a sum that is rounded has no velocity.
+#[test]
+fn velocities_of_round_off_are_no_jumps() {
+    let told = |expr: &str| {
+        crate::scenes::warnings(&format!(
+            "[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 1\ninertia = [1, 1, 1]\n[[joint]]\nkind = \"revolute\"\n\
+             nodes = [\"a\"]\naxis = [0, 0, 1]\nangle = 1\nhistory = \"h\"\n[history.h]\nexpr = \"{expr}\"\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.01\n"
+        ))
+    };
+    assert_eq!(told("sin(t + pi/2) - 1"), Vec::<String>::new());
+    assert!(told("1e-9*t")[0].contains("the velocity jumps"));
 }

@@ -18,6 +18,9 @@ const SAME_VALUE: f64 = 1e-9;
 /// from other numbers.
 const SAME_VELOCITY: f64 = 1e-6;
 
+/// The way of a whole stage with a velocity that is round-off, in lengths of the scene or radians.
+const INVISIBLE_WAY: f64 = 1e-12;
+
 /// Axes with this cosine are the same.
 const SAME_AXIS: f64 = 1.0 - 1e-9;
 
@@ -197,9 +200,10 @@ impl<'p> Rehearser<'p> {
         let surfaces = self.model.surface_jumps(&amplitude, &self.state);
         self.found.refusals.extend(surfaces.into_iter().map(|jump| (number, StageError::SurfaceJump(jump))));
         let given = begins.then_some(&given[..]);
-        self.look_at_velocities(number, given);
-        self.look_at_motors(number, begins);
         if let StageWork::Dynamic(steps) = &stage.work {
+            let slowest = INVISIBLE_WAY / (steps.end - clock);
+            self.look_at_velocities(number, given, slowest);
+            self.look_at_motors(number, begins, slowest);
             self.look_at_kinks(number, steps.end);
             self.look_between_steps(number, steps);
         }
@@ -246,8 +250,8 @@ impl<'p> Rehearser<'p> {
     }
 
     /// Motions at the start of a dynamic stage. `given`: the velocities that initial motions give,
-    /// where they do.
-    fn look_at_velocities(&mut self, number: usize, given: Option<&[Vec3]>) {
+    /// where they do. `slowest`: smaller velocities are round-off, in lengths of the scene or radians.
+    fn look_at_velocities(&mut self, number: usize, given: Option<&[Vec3]>, slowest: f64) {
         let motions = self.schedule.motions(self.model).enumerate();
         for (k, (motion, timeline)) in motions.filter(|(_, (_, timeline))| timeline.acts()) {
             let [value, rate, rate2] = timeline.at(self.state.time, 1.0);
@@ -256,17 +260,20 @@ impl<'p> Rehearser<'p> {
                 (None, Some(before)) => before.velocities[k],
                 (None, None) => Some(0.0),
             };
+            let size = if motion.kind == MotionKind::Translation { self.model.length } else { 1.0 };
             let how = if ![value, rate, rate2].iter().all(|value| value.is_finite()) {
                 Some(JumpKind::NotFinite)
             } else {
-                from.and_then(|from| velocity_jump(from, rate, motion.amplitude.fastest(), given.is_some()))
+                let noticed = noticed_jump(motion.amplitude.fastest(), slowest * size);
+                from.and_then(|from| velocity_jump(from, rate, noticed, given.is_some()))
             };
             self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Motion(k), how }));
         }
     }
 
-    /// Motors at the start of a dynamic stage. `begins`: initial motions set the scene in motion.
-    fn look_at_motors(&mut self, number: usize, begins: bool) {
+    /// Motors at the start of a dynamic stage. `begins`: initial motions set the scene in motion. `slowest`: see
+    /// [`Self::look_at_velocities`].
+    fn look_at_motors(&mut self, number: usize, begins: bool, slowest: f64) {
         // How fast a joint turns that a static stage has turned before is known to nobody yet.
         if begins && self.before.is_some() && !self.initial.is_empty() {
             return;
@@ -280,7 +287,8 @@ impl<'p> Rehearser<'p> {
                 _ => motor.speed,
             };
             let fastest = amplitudes[motor.amplitude].fastest().map(|rate| (rate * motor.value).abs());
-            let how = velocity_jump(from, to, fastest, begins);
+            let size = if motor.turns { 1.0 } else { self.model.length };
+            let how = velocity_jump(from, to, noticed_jump(fastest, slowest * size), begins);
             jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Motor(motor.slot), how }));
         });
     }
@@ -369,11 +377,15 @@ fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
     if fits { along } else { 0.0 }
 }
 
+/// The smallest jump of a velocity that is told.
+fn noticed_jump(fastest: Option<f64>, slowest: f64) -> f64 {
+    fastest.map_or(slowest, |fastest| slowest.max(NOTICED * fastest))
+}
+
 /// A jump of a velocity; none where initial motions move the node of a motion that begins at rest:
 /// the scene begins with the velocity of the motion.
-fn velocity_jump(from: f64, to: f64, fastest: Option<f64>, begins: bool) -> Option<JumpKind> {
-    let noticed = fastest.is_none_or(|fastest| (to - from).abs() > NOTICED * fastest);
-    let jumps = noticed && differ(from, to, SAME_VELOCITY) && (to != 0.0 || !begins);
+fn velocity_jump(from: f64, to: f64, noticed: f64, begins: bool) -> Option<JumpKind> {
+    let jumps = (to - from).abs() > noticed && differ(from, to, SAME_VELOCITY) && (to != 0.0 || !begins);
     jumps.then_some(JumpKind::Velocity { from, to })
 }
 

@@ -439,7 +439,11 @@ impl Dynamics<'_, '_> {
     /// from round-off.
     fn refuse_growth(&mut self) -> Result<(), Failure> {
         let Some(guard) = &mut self.guard else { return Ok(()) };
-        let moved = self.stage.model.farthest(self.stage.good, self.stage.state);
+        let StageRun { model, good, state, assembly, .. } = &*self.stage;
+        let moved = model.farthest(good, state);
+        if moved <= ROUNDED * model.length {
+            guard.pass_over(ROUNDED * model.largest_force(&assembly.system) * model.length);
+        }
         let Some(Growth { grown, largest }) = guard.judge(self.stage.bookkeeper.ledger(), moved) else { return Ok(()) };
         if self.is_round_off(largest) {
             return Ok(());

@@ -7,6 +7,10 @@ use serde::{Deserialize, Serialize};
 /// of the account.
 const RUNNING: usize = 3;
 
+/// Steps at the start of a stage that may bring energy: a sudden load sets vibrations going that steps do not resolve.
+/// What comes behind them is judged.
+const UNJUDGED: usize = 10;
+
 /// Follows the total from the start of a stage.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct EnergyGuard {
@@ -15,6 +19,7 @@ pub struct EnergyGuard {
     round_off: f64,
     start: Option<f64>,
     largest: f64,
+    judged: usize,
     running: usize,
     balance: Balance,
 }
@@ -62,7 +67,7 @@ impl EnergyGuard {
     /// Energies below `floor` are round-off: what Newton tolerates, and on the way the work of
     /// forces as large as `round_off`.
     pub fn new(limit: f64, floor: f64, round_off: f64) -> Self {
-        Self { limit, floor, round_off, start: None, largest: 0.0, running: 0, balance: Balance::default() }
+        Self { limit, floor, round_off, start: None, largest: 0.0, judged: 0, running: 0, balance: Balance::default() }
     }
 
     /// The account where the stage begins, and the total at the start of the run; `round_off` is
@@ -92,8 +97,14 @@ impl EnergyGuard {
     pub fn judge(&mut self, ledger: Ledger, moved: f64) -> Option<Growth> {
         self.floor += self.round_off * moved;
         self.largest = self.largest.max(size(ledger));
-        let grown = ledger.total() - self.start?;
         self.balance.look(ledger);
+        let (total, start) = (ledger.total(), self.start?);
+        self.judged += 1;
+        if self.judged <= UNJUDGED {
+            self.start = Some(start.max(total));
+            return None;
+        }
+        let grown = total - start;
         let grows = grown > self.limit * self.largest && self.largest > self.floor;
         self.running = if grows { self.running + 1 } else { 0 };
         (self.running >= RUNNING).then_some(Growth { grown, largest: self.largest })
@@ -135,6 +146,7 @@ mod tests {
     fn growth_that_lasts_three_steps_is_told() {
         let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
         guard.open(ledger(1.0), 1.0, 0.0);
+        assert!((0..UNJUDGED).all(|_| guard.judge(ledger(1.0), 0.0).is_none()));
         assert!(guard.judge(ledger(1.2), 0.0).is_none());
         assert!(guard.judge(ledger(1.3), 0.0).is_none());
         assert!(guard.judge(ledger(1.1), 0.0).is_none());
@@ -142,6 +154,15 @@ mod tests {
         assert!(guard.judge(ledger(1.3), 0.0).is_none());
         let growth = guard.judge(ledger(1.4), 0.0).unwrap();
         assert!((growth.grown - 0.4).abs() < 1e-15 && growth.largest == 1.4);
+    }
+
+    #[test]
+    fn what_the_first_steps_bring_is_no_growth() {
+        let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
+        guard.open(ledger(1.0), 1.0, 0.0);
+        assert!((0..UNJUDGED).all(|_| guard.judge(ledger(2.0), 0.0).is_none()));
+        assert!((0..9).all(|_| guard.judge(ledger(2.1), 0.0).is_none()));
+        assert!((0..3).any(|_| guard.judge(ledger(3.0), 0.0).is_some()));
     }
 
     #[test]
