@@ -432,3 +432,33 @@ fn parts_that_touch_in_a_point_are_apart_there() {
         assert!(error < 4e-3, "{number}: {error:.1e}");
     }
 }
+
+/// A tube of two arcs, wherever they part it, whichever way they run.
+#[test]
+fn tubes_of_two_arcs_are_tubes() {
+    let material = "[material.m]\nE = 2\nnu = 0.3\nrho = 1\n";
+    let tube = stiffness(&format!(
+        "{material}[section.s]\nmaterial = \"m\"\nshape = \"tube\"\nradius = 0.11\nthickness = 0.02\nshear_factor = \"energy\"\n"
+    ));
+    for (degrees, turned) in [(180.0, false), (120.0, false), (250.0, false), (180.0, true), (100.0, true)] {
+        let on_circle = |degrees: f64| {
+            let (sine, cosine) = f64::to_radians(degrees + 20.0).sin_cos();
+            format!("[{}, {}]", 0.1 * cosine, 0.1 * sine)
+        };
+        let second = match turned {
+            false => format!("from = \"b\", to = \"a\", arc = {}", on_circle(0.5 * (degrees + 360.0))),
+            true => format!("from = \"a\", to = \"b\", arc = {}", on_circle(0.5 * (degrees + 360.0))),
+        };
+        let walls = stiffness(&format!(
+            "{material}[section.s]\nmaterial = \"m\"\nshape = \"walls\"\npoints = {{ a = {}, b = {} }}\n\
+             walls = [{{ from = \"a\", to = \"b\", thickness = 0.02, arc = {} }}, {{ {second}, thickness = 0.02 }}]\n",
+            on_circle(0.0),
+            on_circle(degrees),
+            on_circle(0.5 * degrees)
+        ));
+        for k in 0..6 {
+            let error = walls[(k, k)] / tube[(k, k)] - 1.0;
+            assert!(error.abs() < 1e-3, "{degrees}, {turned}, {k}: {error:e}");
+        }
+    }
+}

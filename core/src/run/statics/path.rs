@@ -42,6 +42,12 @@ const BELIEVED: f64 = 1.0 / 1024.0;
 const MOST_LOOKS: usize = 40;
 /// The size of a correction, over the step, beyond which it is a flight.
 const FLIGHT: f64 = 100.0;
+/// The largest residual that may be round-off, over the allowed one.
+const NEARLY_ALLOWED: f64 = 10.0;
+/// The part of a residual that corrections leave where it no longer falls.
+const STALLED: f64 = 0.3;
+/// The largest correction by round-off, in lengths of the scene and radians.
+const TINY_CORRECTION: f64 = 1e-9;
 /// The length, over the step, to which a special point is located.
 const LOCATED: f64 = 1e-9;
 
@@ -258,6 +264,10 @@ impl Path {
                     stage.refuse_departures()?;
                     return Ok(done);
                 }
+                Verdict::Continue if is_round_off(&history, last) => {
+                    stage.refuse_departures()?;
+                    return Ok(done);
+                }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, stage.state)),
                 Verdict::Continue if done.iterations == newton.max_iterations => {
                     return Err(NewtonFailure::NotConverged { residual, history });
@@ -388,6 +398,13 @@ struct Corrected {
 struct Bracket {
     at: f64,
     value: f64,
+}
+
+/// True where corrections go on without making a small residual smaller: what is left is its round-off, more of it than
+/// was estimated. `history`: the residuals, relative to what is allowed; `last`: the size of the last correction.
+fn is_round_off(history: &[f64], last: Option<f64>) -> bool {
+    let [.., before, now] = history[..] else { return false };
+    now <= NEARLY_ALLOWED && now > STALLED * before && last.is_some_and(|size| size <= TINY_CORRECTION)
 }
 
 /// Adds a correction; whether nodes changed their charts by it.

@@ -12,6 +12,7 @@ mod joints;
 mod line;
 mod steps;
 mod strips;
+mod twins;
 mod wall;
 
 pub use wall::{Bend, Ply, Wall, Walls};
@@ -24,7 +25,7 @@ use strips::Strips;
 
 /// Meshes walls.
 pub fn mesh_walls(walls: &Walls, fineness: Fineness) -> Result<Mesh, SectionError> {
-    let walls = &walls.with_steps_away_from_branches()?;
+    let walls = &walls.with_twins_parted()?.with_steps_away_from_branches()?;
     let lines = walls.lines()?;
     let joints = joints(walls, &lines)?;
     let mut strips = Strips::new(walls, lines, joints)?;
