@@ -7,7 +7,7 @@ use super::pivots::is_symmetric;
 use super::softest::lost_part;
 use crate::interrupt;
 use crate::system::{Pattern, Symmetry, System};
-use nalgebra::{Complex, DMatrix, SymmetricEigen};
+use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 
 /// A rigid motion is linearly dependent on others if orthogonalisation reduces it to this part of
 /// its norm.
@@ -121,11 +121,15 @@ impl ProblemForm {
     }
 }
 
-/// Rigid motions R that dampers slow down: K R = 0, and R.C R has a positive definite symmetric part.
+/// Rigid motions R that dampers slow down: K R = 0, and R.C R is positive definite.
 #[derive(Default)]
 struct DampedRigidMotions {
     /// Orthonormal in M
     motions: Vec<Vec<f64>>,
+    /// M R
+    momenta: Vec<Vec<f64>>,
+    /// C R
+    forces: Vec<Vec<f64>>,
     /// The inverse of R.C R
     inverse: DMatrix<f64>,
 }
@@ -231,8 +235,8 @@ impl<'a> ModeSearch<'a> {
             factorisations: 0,
         };
         rigid.into_iter().for_each(|motion| search.take_out(motion));
-        // Only where K is symmetric is r.K = 0, as r.(C x + M s x) = 0 needs it.
-        if damped && symmetric && form == ProblemForm::General {
+        // Only where K is symmetric is r.K = 0, as r.(C x + M s x) = 0 needs it, and only where C is, is r.C = C r.
+        if damped && symmetric && is_symmetric(&search.system.pattern, &matrices.damping) {
             search.split_off_damped();
         }
         search
@@ -258,7 +262,6 @@ impl<'a> ModeSearch<'a> {
         };
         let all: Vec<Vec<f64>> = self.rigid.iter().map(|[motion, _]| motion.clone()).collect();
         let rates = products(&damping, &all);
-        let rates = (&rates + rates.transpose()) * 0.5;
         let in_sizes: Vec<Vec<f64>> = all.iter().map(|motion| motion.iter().map(|x| x.abs()).collect()).collect();
         let terms = products(&sizes, &in_sizes);
         if terms.iter().any(|term| !term.is_finite()) {
@@ -285,10 +288,12 @@ impl<'a> ModeSearch<'a> {
             sum
         };
         let motions: Vec<Vec<f64>> = damped.iter().map(|k| combine(k, 0)).collect();
-        // Its symmetric part is positive definite.
-        if let Some(inverse) = products(&damping, &motions).try_inverse() {
+        let momenta = damped.iter().map(|k| combine(k, 1)).collect();
+        let forces: Vec<Vec<f64>> = motions.iter().map(|motion| self.system.multiply(&damping, motion)).collect();
+        let rates = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i], &forces[j]));
+        if let Some(inverse) = rates.try_inverse() {
             self.rigid = free.iter().map(|k| [combine(k, 0), combine(k, 1)]).collect();
-            self.damped_rigid = DampedRigidMotions { motions, inverse };
+            self.damped_rigid = DampedRigidMotions { motions, momenta, forces, inverse };
         }
     }
 
@@ -322,16 +327,13 @@ impl<'a> ModeSearch<'a> {
     fn project_doubled(&self, x: &mut [f64], second: &mut [f64]) {
         self.project(x);
         self.project(second);
-        let DampedRigidMotions { motions, inverse } = &self.damped_rigid;
+        let DampedRigidMotions { motions, momenta, forces, inverse } = &self.damped_rigid;
         if motions.is_empty() {
             return;
         }
-        let mut impulse = self.system.multiply(&self.matrices.damping, x);
-        let momentum = self.system.multiply(&self.matrices.mass, second);
-        impulse.iter_mut().zip(&momentum).for_each(|(impulse, momentum)| *impulse += self.shift * momentum);
-        let along: Vec<f64> = motions.iter().map(|motion| dot(motion, &impulse)).collect();
-        for (k, motion) in motions.iter().enumerate() {
-            let part = dot(inverse.row(k).iter().copied().collect::<Vec<f64>>().as_slice(), &along);
+        let impulse = |k: usize| dot(&forces[k], x) + self.shift * dot(&momenta[k], second);
+        let parts = inverse * DVector::from_fn(motions.len(), |k, _| impulse(k));
+        for (motion, part) in motions.iter().zip(&parts) {
             x.iter_mut().zip(motion).for_each(|(x, r)| *x -= part * r);
         }
     }
