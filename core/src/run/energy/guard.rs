@@ -171,7 +171,7 @@ mod tests {
         guard.open(ledger(0.0), 0.0, 0.0);
         assert!((1..10).all(|k| guard.judge(ledger(5e-4 * f64::from(k)), 1.0).is_none()));
         let mut still = guard.clone();
-        assert!((10..14).any(|k| still.judge(ledger(5e-3 * f64::from(k)), 0.0).is_some()));
+        assert!((10..17).any(|k| still.judge(ledger(5e-3 * f64::from(k)), 0.0).is_some()));
     }
 
     #[test]
@@ -179,7 +179,7 @@ mod tests {
         let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
         guard.open(ledger(0.0), 0.0, 1e-15);
         assert!((1..10).all(|k| guard.judge(ledger(1e-16 * f64::from(k)), 0.0).is_none()));
-        assert!((10..14).any(|k| guard.judge(ledger(1e-15 * f64::from(k)), 0.0).is_some()));
+        assert!((10..17).any(|k| guard.judge(ledger(1e-15 * f64::from(k)), 0.0).is_some()));
     }
 
     #[test]
