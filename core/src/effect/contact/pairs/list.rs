@@ -24,7 +24,8 @@ const MARGIN_OF_ELEMENT: f64 = 0.1;
 /// The margin of a list, over the largest motion in the last step.
 const MARGIN_OF_MOTION: f64 = 2.5;
 
-/// Fast motions make the margin larger by this factor at most.
+/// Fast motions make the margin larger by this factor at most: pairs that are missed are added, and the step taken
+/// again, which costs less than the places of many pairs in the tangent.
 const LARGEST_MARGIN: f64 = 2.0;
 
 /// A list is made anew when a node has moved by this part of the margin.
