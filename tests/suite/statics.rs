@@ -347,3 +347,17 @@ fn turns_that_only_an_iteration_makes_are_not_counted() {
         }
     }
 }
+
+/// A stiff half ring turned inside out by a line moment: residuals are round-off of its tension stiffness, which arc length
+/// accepts like load levels. sin(phi) = m R^2/EI.
+#[test]
+fn arc_length_accepts_residuals_of_round_off() {
+    let run = simulate(
+        "[section.s]\nEA = 1e6\nGA = 4e5\nGJ = 1\nEI = [1, 1]\n[point]\na = [0.08, 0, 0]\nb = [-0.08, 0, 0]\n[[beam]]\nname = \"k\"\n\
+         section = \"s\"\narc = [\"a\", [0, 0.08, 0], \"b\"]\nelements = 64\norder = 3\n[[support]]\nat = \"a\"\nfix = [\"uy\", \"uz\", \"rx\", \"rz\"]\n\
+         [[support]]\nat = \"b\"\nfix = [\"uy\", \"uz\", \"rx\", \"rz\"]\n[[support]]\nat = \"k@0.5\"\nfix = [\"ux\"]\n\
+         [[load]]\nalong = \"k\"\nmoment = [1, 0, 0]\nframe = \"section\"\n[[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = 10\n\
+         [output]\nnodes = [\"a\"]\ncolumns = [\"r\"]\n",
+    );
+    assert!((run.end("a.ry").sin() - 0.08 * 0.08).abs() < 1e-7, "{}", run.end("a.ry"));
+}

@@ -18,8 +18,6 @@ pub struct SpinningPart {
     pub axis: Vec3,
     /// GJ/L, a moment per radian
     pub stiffness: f64,
-    /// EA L, a moment per radian, beside whose round-off a tangent must tell the hold
-    pub tension_stiffness: f64,
 }
 
 /// The stiffness of the hold in load levels and time steps, over GJ/L: large enough that tolerated
@@ -30,10 +28,6 @@ const HOLD_RATIO: f64 = 1e-3;
 /// The stiffness of the hold in tangents without mass, over GJ/L: small enough that modes do not
 /// change.
 const HOLD_RATIO_IN_MODES: f64 = 1e-8;
-
-/// The least stiffness of the hold in tangents without mass, over EA L: of very thin parts GJ/L is next to the
-/// round-off of their tension stiffness.
-const LEAST_HOLD_IN_MODES: f64 = 1e-14;
 
 /// The stages in which spins are held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,15 +88,12 @@ impl Effect for SpinHold {
             return;
         }
         let among_modes = self.held_in == HeldIn::Motion && weights.mass == 0.0;
+        let hold = weights.stiffness * if among_modes { HOLD_RATIO_IN_MODES } else { HOLD_RATIO };
         let mut system = ElementSystem::new(1);
         for (k, part) in self.parts.iter().enumerate() {
             system.clear();
             let about = at.rotation(part.node.p).t.transpose_mul(part.axis);
-            let hold = match among_modes {
-                true => (HOLD_RATIO_IN_MODES * part.stiffness).max(LEAST_HOLD_IN_MODES * part.tension_stiffness),
-                false => HOLD_RATIO * part.stiffness,
-            };
-            system.add_tangent(0, 0, about.outer(about).scale(weights.stiffness * hold));
+            system.add_tangent(0, 0, about.outer(about).scale(part.stiffness * hold));
             out.add(k, &system);
         }
     }

@@ -121,17 +121,16 @@ impl ProblemForm {
     }
 }
 
-/// Rigid motions R that dampers slow down: K R = 0, and R.C R is positive definite.
-#[derive(Default)]
-struct DampedRigidMotions {
-    /// Orthonormal in M
-    motions: Vec<Vec<f64>>,
-    /// M R
-    momenta: Vec<Vec<f64>>,
-    /// C R
-    forces: Vec<Vec<f64>>,
-    /// The inverse of R.C R
-    inverse: DMatrix<f64>,
+/// A rigid motion r that dampers slow down: K r = 0 and r.C r > 0. For different ones r.C r' = 0.
+struct DampedRigidMotion {
+    /// r, with r.M r = 1
+    motion: Vec<f64>,
+    /// M r
+    momentum: Vec<f64>,
+    /// C r
+    force: Vec<f64>,
+    /// r.C r, 1/time
+    rate: f64,
 }
 
 /// The eigenvalue problem of a state.
@@ -146,8 +145,8 @@ pub struct ModeSearch<'a> {
     /// Orthonormal rigid motions of free parts that nothing damps, and M times each; all vectors are
     /// orthogonal to them
     rigid: Vec<[Vec<f64>; 2]>,
-    /// Rigid motions that dampers resist
-    damped_rigid: DampedRigidMotions,
+    /// Rigid motions that dampers slow down
+    damped_rigid: Vec<DampedRigidMotion>,
     shift: f64,
     /// True if the system and its factors are those of the shift
     is_ready: bool,
@@ -228,7 +227,7 @@ impl<'a> ModeSearch<'a> {
             form,
             multipliers,
             rigid: Vec::new(),
-            damped_rigid: DampedRigidMotions::default(),
+            damped_rigid: Vec::new(),
             shift: 0.0,
             is_ready: false,
             negative: None,
@@ -244,57 +243,57 @@ impl<'a> ModeSearch<'a> {
 
     /// Number of linearly independent rigid motions.
     pub fn rigid(&self) -> usize {
-        self.rigid.len() + self.damped_rigid.motions.len()
+        self.rigid.len() + self.damped_rigid.len()
     }
 
-    /// Splits rigid motions that dampers slow down off the others. Round-off of r.C r is told from damping by the sum of
-    /// its terms.
+    /// Splits rigid motions that dampers slow down off the others.
     fn split_off_damped(&mut self) {
-        let count = self.rigid.len();
-        if count == 0 {
+        let rates = self.rates_of_rigid_motions();
+        let is_damped = |(_, rate): &(DVector<f64>, f64)| *rate > 0.0;
+        if !rates.iter().any(is_damped) {
             return;
         }
-        let [damping, sizes]: [Vec<f64>; 2] =
-            [self.matrices.damping.clone(), self.matrices.damping.iter().map(|c| c.abs()).collect()];
+        let all = std::mem::take(&mut self.rigid);
+        for (parts, rate) in rates {
+            let combine = |which: usize| {
+                let mut sum = vec![0.0; all[0][which].len()];
+                for (factor, motion) in parts.iter().zip(&all) {
+                    sum.iter_mut().zip(&motion[which]).for_each(|(sum, part)| *sum += factor * part);
+                }
+                sum
+            };
+            let [motion, momentum] = [combine(0), combine(1)];
+            if rate > 0.0 {
+                let force = self.system.multiply(&self.matrices.damping, &motion);
+                self.damped_rigid.push(DampedRigidMotion { motion, momentum, force, rate });
+            } else {
+                self.rigid.push([motion, momentum]);
+            }
+        }
+    }
+
+    /// Combinations of the rigid motions for which R.C R is diagonal, with its entries: zero where they are round-off,
+    /// beside the sum of their terms. Empty without rigid motions, or where numbers are not finite.
+    fn rates_of_rigid_motions(&self) -> Vec<(DVector<f64>, f64)> {
         let products = |values: &[f64], motions: &[Vec<f64>]| {
             let images: Vec<Vec<f64>> = motions.iter().map(|motion| self.system.multiply(values, motion)).collect();
             DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i], &images[j]))
         };
-        let all: Vec<Vec<f64>> = self.rigid.iter().map(|[motion, _]| motion.clone()).collect();
-        let rates = products(&damping, &all);
-        let in_sizes: Vec<Vec<f64>> = all.iter().map(|motion| motion.iter().map(|x| x.abs()).collect()).collect();
-        let terms = products(&sizes, &in_sizes);
-        if terms.iter().any(|term| !term.is_finite()) {
-            return;
+        let sizes = |values: &[f64]| values.iter().map(|value| value.abs()).collect::<Vec<f64>>();
+        let damping = &self.matrices.damping;
+        let motions: Vec<Vec<f64>> = self.rigid.iter().map(|[motion, _]| motion.clone()).collect();
+        let terms = products(&sizes(damping), &motions.iter().map(|motion| sizes(motion)).collect::<Vec<_>>());
+        if motions.is_empty() || terms.iter().any(|term| !term.is_finite()) {
+            return Vec::new();
         }
-        let Some(SymmetricEigen { eigenvalues, eigenvectors }) =
-            SymmetricEigen::try_new(rates, f64::EPSILON, MOST_EIGENVALUE_SWEEPS)
-        else {
-            return;
+        let eigen = SymmetricEigen::try_new(products(damping, &motions), f64::EPSILON, MOST_EIGENVALUE_SWEEPS);
+        let Some(SymmetricEigen { eigenvalues, eigenvectors }) = eigen else { return Vec::new() };
+        let rate = |k: usize| {
+            let parts = eigenvectors.column(k).into_owned();
+            let all = (parts.abs().transpose() * &terms * parts.abs())[0];
+            (parts, if eigenvalues[k] > NEGLIGIBLE_RATE * all { eigenvalues[k] } else { 0.0 })
         };
-        let is_damped = |k: &usize| {
-            let parts = eigenvectors.column(*k).abs();
-            eigenvalues[*k] > NEGLIGIBLE_RATE * (parts.transpose() * &terms * &parts)[0]
-        };
-        let (damped, free): (Vec<usize>, Vec<usize>) = (0..count).partition(is_damped);
-        if damped.is_empty() {
-            return;
-        }
-        let combine = |k: &usize, which: usize| {
-            let mut sum = vec![0.0; all[0].len()];
-            for (factor, parts) in eigenvectors.column(*k).iter().zip(&self.rigid) {
-                sum.iter_mut().zip(&parts[which]).for_each(|(sum, part)| *sum += factor * part);
-            }
-            sum
-        };
-        let motions: Vec<Vec<f64>> = damped.iter().map(|k| combine(k, 0)).collect();
-        let momenta = damped.iter().map(|k| combine(k, 1)).collect();
-        let forces: Vec<Vec<f64>> = motions.iter().map(|motion| self.system.multiply(&damping, motion)).collect();
-        let rates = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i], &forces[j]));
-        if let Some(inverse) = rates.try_inverse() {
-            self.rigid = free.iter().map(|k| [combine(k, 0), combine(k, 1)]).collect();
-            self.damped_rigid = DampedRigidMotions { motions, momenta, forces, inverse };
-        }
+        (0..motions.len()).map(rate).collect()
     }
 
     /// Orthonormalises a rigid motion and adds it, unless it is linearly dependent on the others.
@@ -327,13 +326,8 @@ impl<'a> ModeSearch<'a> {
     fn project_doubled(&self, x: &mut [f64], second: &mut [f64]) {
         self.project(x);
         self.project(second);
-        let DampedRigidMotions { motions, momenta, forces, inverse } = &self.damped_rigid;
-        if motions.is_empty() {
-            return;
-        }
-        let impulse = |k: usize| dot(&forces[k], x) + self.shift * dot(&momenta[k], second);
-        let parts = inverse * DVector::from_fn(motions.len(), |k, _| impulse(k));
-        for (motion, part) in motions.iter().zip(&parts) {
+        for DampedRigidMotion { motion, momentum, force, rate } in &self.damped_rigid {
+            let part = (dot(force, x) + self.shift * dot(momentum, second)) / rate;
             x.iter_mut().zip(motion).for_each(|(x, r)| *x -= part * r);
         }
     }
@@ -436,7 +430,7 @@ impl<'a> ModeSearch<'a> {
         let largest = values.iter().map(|theta| theta.norm()).fold(0.0, f64::max);
         let is_there = |theta: &Complex<f64>| theta.norm() > SMALLEST_ROUGH_PART * largest;
         // Decays of damped rigid motions may be far slower than all else, and would draw the shift to where digits are lost.
-        let mut decays = self.damped_rigid.motions.len();
+        let mut decays = self.damped_rigid.len();
         let there = values.into_iter().filter(is_there).take(ROUGH_EXPONENTS + decays);
         let mut exponents: Vec<Complex<f64>> = there.map(|theta| form.exponent(shift, theta)).collect();
         exponents.retain(|s| {

@@ -106,13 +106,12 @@ impl Composer<'_> {
         }
         let beam = beams[0];
         let middle = beams[0].nodes.len() / 2;
-        let section = beam.section.at(beam.fractions[middle]).stiffness;
+        let torsion = beam.section.at(beam.fractions[middle]).stiffness[3][3];
         let hold = SpinningPart {
             node: nodes[middle].node,
             nodes: nodes.iter().map(|node| node.node).collect(),
             axis,
-            stiffness: section[3][3] / length,
-            tension_stiffness: section[0][0] * length,
+            stiffness: torsion / length,
         };
         Some(StraightPart { beams, ends: [first_end.node.p, second_end.node.p], hold })
     }
