@@ -26,6 +26,10 @@ const RELATIVE_WEIGHT: f64 = 8.0;
 /// Displacements are taken in lengths of the scene, rotations in radians.
 const NEGLIGIBLE: f64 = 1e-12;
 
+/// No stiffness is taken to be below this part of the largest one of all constraints: what a part resists only by the
+/// round-off of the forces in its joints is no stiffness, and a weight from it would leave pivots of round-off.
+const LEAST_STIFFNESS: f64 = 1e-10;
+
 /// The multipliers of a pattern, and the values of the last prepared tangent.
 #[derive(Clone)]
 pub struct Constraints {
@@ -45,8 +49,7 @@ struct Multiplier {
     ties: Vec<ConstrainedUnknown>,
 }
 
-/// An unknown that a multiplier constrains, with the positions of its entries of C, of B and of the
-/// diagonal.
+/// An unknown that a multiplier constrains, with the positions of its entries of C and of B.
 #[derive(Clone)]
 struct ConstrainedUnknown {
     equation: u32,
@@ -54,7 +57,8 @@ struct ConstrainedUnknown {
     scale2: f64,
     of_column: usize,
     of_row: usize,
-    diagonal: usize,
+    /// Positions of the entries of its column in the rows of its node, with the product of the units of row and column
+    own: Vec<(usize, f64)>,
 }
 
 /// An entry of C W B: the position it is added to, the index of the multiplier, and the positions
@@ -86,6 +90,7 @@ impl Constraints {
             let entries = || pattern.entries(column).map(|entry| (entry.row, entry.place)).collect();
             columns.entry(column).or_insert_with(entries).get(&row).copied()
         };
+        let node_block_of = |equation: u32| pattern.node_blocks.of(pattern.dof_map.direction(equation as usize).slot);
         let mut rows = Vec::new();
         let mut additions = Vec::new();
         for (number, &equation) in equations.iter().enumerate() {
@@ -94,8 +99,12 @@ impl Constraints {
             let tie = |other: u32| {
                 let of_column = place(other, equation)?;
                 let of_row = place(equation, other)?;
-                let (scale2, diagonal) = (scales[other as usize].powi(2), place(other, other)?);
-                Some(ConstrainedUnknown { equation: other, scale2, of_column, of_row, diagonal })
+                let scale = scales[other as usize];
+                let node = node_block_of(other);
+                let of_node = |row: u32| !is_multiplier[row as usize] && node_block_of(row) == node;
+                let own = pattern.entries(other).filter(|entry| of_node(entry.row));
+                let own = own.map(|entry| (entry.place, scale * scales[entry.row as usize])).collect();
+                Some(ConstrainedUnknown { equation: other, scale2: scale.powi(2), of_column, of_row, own })
             };
             let ties: Vec<ConstrainedUnknown> = others.filter_map(tie).collect();
             for (k, a) in ties.iter().enumerate() {
@@ -139,11 +148,19 @@ impl Constraints {
         let Self { rows, additions, weights, values, .. } = self;
         values.clear();
         values.extend_from_slice(&system.values);
-        let largest = rows.iter().flat_map(|row| &row.ties).map(|tie| tie.stiffness(values)).fold(0.0, f64::max);
-        weights.iter_mut().zip(&*rows).for_each(|(weight, row)| *weight = row.weight(values, largest));
+        weigh(rows, values, weights);
         for addition in additions {
             let product = system.values[addition.of_column] * system.values[addition.of_row];
             values[addition.place] += weights[addition.row] * product;
+        }
+    }
+
+    /// Adds the diagonal of C W B, by equation, for the present values of a system.
+    pub fn add_diagonal(&self, system: &System, diagonal: &mut [f64]) {
+        let mut weights = vec![0.0; self.rows.len()];
+        weigh(&self.rows, &system.values, &mut weights);
+        for (row, weight) in self.rows.iter().zip(weights) {
+            row.ties.iter().for_each(|tie| diagonal[tie.equation as usize] += weight * tie.square(&system.values));
         }
     }
 
@@ -165,10 +182,17 @@ impl Constraints {
     }
 }
 
+/// The weight of each multiplier for a tangent.
+fn weigh(rows: &[Multiplier], values: &[f64], weights: &mut [f64]) {
+    let largest = rows.iter().flat_map(|row| &row.ties).map(|tie| tie.own_stiffness(values)).fold(0.0, f64::max);
+    weights.iter_mut().zip(rows).for_each(|(weight, row)| *weight = row.weight(values, LEAST_STIFFNESS * largest));
+}
+
 impl ConstrainedUnknown {
-    /// Stiffness of the unknown, in comparable units.
-    fn stiffness(&self, values: &[f64]) -> f64 {
-        values[self.diagonal].abs() * self.scale2
+    /// Stiffness of the unknown, in comparable units: the largest entry that couples it with its own node. Where forces in
+    /// joints turn with a part, its diagonal may be empty.
+    fn own_stiffness(&self, values: &[f64]) -> f64 {
+        self.own.iter().map(|&(place, scale)| values[place].abs() * scale).fold(0.0, f64::max)
     }
 
     /// B_k C_k
@@ -179,21 +203,16 @@ impl ConstrainedUnknown {
 
 impl Multiplier {
     /// Weight from the stiffness of the constrained unknowns, independent of units:
-    /// `RELATIVE_WEIGHT`/w = sum B_k C_k/|K_kk|. Without any such stiffness the `largest` one of the
-    /// scene is used.
-    fn weight(&self, values: &[f64], largest: f64) -> f64 {
+    /// `RELATIVE_WEIGHT`/w = sum B_k C_k/k_k. Each has at least the stiffness `least`.
+    fn weight(&self, values: &[f64], least: f64) -> f64 {
         let part = |tie: &ConstrainedUnknown| tie.square(values) * tie.scale2;
+        let stiffness = |tie: &ConstrainedUnknown| tie.own_stiffness(values).max(least);
         let most = self.ties.iter().map(part).fold(0.0, f64::max);
         // Coefficients that are round-off do not make an unknown part of the constraint.
         let constrained = self.ties.iter().filter(|tie| part(tie) > NEGLIGIBLE * NEGLIGIBLE * most);
-        let stiffest = constrained.map(|tie| tie.stiffness(values)).fold(0.0, f64::max);
-        let stiff = self.ties.iter().filter(|tie| tie.stiffness(values) > NEGLIGIBLE * stiffest);
-        let softness: f64 = stiff.map(|tie| tie.square(values) / values[tie.diagonal].abs()).sum();
-        let squares: f64 = self.ties.iter().map(part).sum();
-        match (softness > 0.0, squares > 0.0) {
-            (true, _) => RELATIVE_WEIGHT / softness,
-            (false, true) => largest / squares,
-            (false, false) => 0.0,
-        }
+        let stiffest = constrained.map(stiffness).fold(0.0, f64::max);
+        let stiff = self.ties.iter().filter(|tie| stiffness(tie) > NEGLIGIBLE * stiffest);
+        let softness: f64 = stiff.map(|tie| part(tie) / stiffness(tie)).sum();
+        if softness > 0.0 { RELATIVE_WEIGHT / softness } else { 0.0 }
     }
 }

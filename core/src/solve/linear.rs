@@ -290,6 +290,14 @@ impl LinearSolver {
         done
     }
 
+    /// Solves as [`Self::solve`] where multipliers may have lost digits, else as [`Self::solve_once`].
+    pub fn solve_for_modes(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
+        match self.constraints {
+            Some(_) => self.solve(system, right_hand_side),
+            None => self.solve_once(system, right_hand_side),
+        }
+    }
+
     /// Solves with the last factorisation, without refinement; `false` if the solution is not
     /// finite.
     pub fn solve_once(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {

@@ -73,7 +73,7 @@ impl LinearSolver {
         }
         let diagonal = diagonal(system);
         let empty = empty_column(system, &diagonal);
-        let scale = scales(system, diagonal);
+        let scale = scales(system, self.stiffened(system, diagonal));
         let broke_down = !(if tangent.stays() { self.factored } else { self.factorise_new(tangent).is_done });
         if let Some(empty) = empty {
             let mut entries = vec![0.0; tangent.system().pattern.dof_map.count()];
@@ -99,6 +99,14 @@ impl LinearSolver {
         let system = tangent.look();
         let held = stiffness_of(system, &motion) > MIN_STIFFNESS_RATIO && !self.is_redundant(system, &x, &motion);
         Some(NullVector { entries: x, motion, held, broke_down: false })
+    }
+
+    /// The diagonal with the stiffness by which joints hold what has none of its own.
+    fn stiffened(&self, system: &System, mut diagonal: Vec<f64>) -> Vec<f64> {
+        if let Some(constraints) = self.constraints() {
+            constraints.add_diagonal(system, &mut diagonal);
+        }
+        diagonal
     }
 
     /// Chooses the method for the next attempt after Newton's iteration has failed: partial
