@@ -7,8 +7,11 @@ use crate::interrupt;
 use crate::scalar::{Instructions, LANES, Lanes};
 use crate::sorting::sort_by;
 use crate::threads;
-use faer::linalg::solvers::{Eigen, SelfAdjointEigen, Solve};
-use faer::{Mat, Side};
+use faer::diag::Diag;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::evd::{ComputeEigenvectors, EvdParams, evd_real, evd_scratch};
+use faer::linalg::solvers::{SelfAdjointEigen, Solve};
+use faer::{Auto, Mat, Par, Side};
 use nalgebra::Complex;
 
 /// A linear operator with an inner product.
@@ -485,7 +488,7 @@ fn symmetric_eigenvalues(matrix: &Mat<f64>) -> Vec<Complex<f64>> {
 }
 
 fn eigenvalues(matrix: &Mat<f64>) -> Vec<Complex<f64>> {
-    matrix.eigenvalues().unwrap_or_default()
+    decompose(matrix, None)
 }
 
 fn symmetric_eigenpairs(matrix: &Mat<f64>) -> Vec<Eigenpair> {
@@ -499,11 +502,38 @@ fn symmetric_eigenpairs(matrix: &Mat<f64>) -> Vec<Eigenpair> {
 }
 
 fn eigenpairs(matrix: &Mat<f64>) -> Vec<Eigenpair> {
-    match Eigen::new_from_real(matrix.as_ref()) {
-        Ok(eigen) => {
-            let vector = |k: usize| eigen.U().col(k).iter().copied().collect();
-            (0..matrix.nrows()).map(|k| (eigen.S()[k], vector(k))).collect()
-        }
+    let size = matrix.nrows();
+    let mut parts = Mat::zeros(size, size);
+    let values = decompose(matrix, Some(&mut parts));
+    // A column for a real eigenvalue; two for a pair, the real and the imaginary part of the vector of the first.
+    let vector = |k: usize| -> Vec<Complex<f64>> {
+        let part = |i: usize| match values[k].im {
+            0.0 => Complex::new(parts[(i, k)], 0.0),
+            im if im > 0.0 => Complex::new(parts[(i, k)], parts[(i, k + 1)]),
+            _ => Complex::new(parts[(i, k - 1)], -parts[(i, k)]),
+        };
+        (0..size).map(part).collect()
+    };
+    (0..values.len()).map(|k| (values[k], vector(k))).collect()
+}
+
+/// The eigenvalues of a matrix, of conjugate ones that with the positive imaginary part first, and the parts of their
+/// vectors; none where they are not found.
+///
+/// The decomposition does not deflate early: faer 0.24.4 sorts eigenvalues for that, without an end where two pairs are
+/// equal but for round-off.
+fn decompose(matrix: &Mat<f64>, vectors: Option<&mut Mat<f64>>) -> Vec<Complex<f64>> {
+    let size = matrix.nrows();
+    let mut params = <EvdParams as Auto<f64>>::auto();
+    params.schur.blocking_threshold = usize::MAX;
+    let wants = if vectors.is_some() { ComputeEigenvectors::Yes } else { ComputeEigenvectors::No };
+    let room = evd_scratch::<f64>(size, ComputeEigenvectors::No, wants, Par::Seq, params.into());
+    let (mut re, mut im) = (Diag::zeros(size), Diag::zeros(size));
+    let mut memory = MemBuffer::new(room);
+    let stack = MemStack::new(&mut memory);
+    let vectors = vectors.map(|vectors| vectors.as_mut());
+    match evd_real(matrix.as_ref(), re.as_mut(), im.as_mut(), None, vectors, Par::Seq, stack, params.into()) {
+        Ok(()) => (0..size).map(|k| Complex::new(re[k], im[k])).collect(),
         Err(_) => Vec::new(),
     }
 }
