@@ -4,6 +4,7 @@ use crate::random::Random;
 use crate::scenes::{attempt, list, modes};
 use beamsim_core::run::Mode;
 use beamsim_core::tensor::Vec3;
+use beamsim_core::warning::WarningKind;
 use nalgebra::{Complex, DMatrix};
 
 /// A body on a hinge with a spring and a damper, in a frame that turns about an axis beside the hinge.
@@ -213,6 +214,89 @@ fn damped_rigid_motions_of_bodies_and_beams_are_complete() {
     assert!(found.iter().any(|s| (s.im - 32.97).abs() < 0.01), "{found:?}");
     // Numbers without a square come to an end, whatever it is.
     attempt(&body.replace("0.05", "1e308"));
+}
+
+/// A straight cable between pins may spin about its axis, without mass and without stiffness: along any direction and however thin it is
+/// it swings as a string does, and the spin is no mode.
+#[test]
+fn thin_pinned_cables_swing_as_strings() {
+    let mut random = Random::new(61);
+    let (length, tension, stretching) = (2.0_f64, 10.0_f64, 1000.0);
+    for thinness in [1e-3, 1e-5, 1e-7, 1e-9, 1e-11] {
+        for _ in 0..3 {
+            let text = format!(
+                "[point]\na = [0, 0, 0]\nb = {}\n[section.s]\nEA = {stretching}\nGA = 400\nGJ = {thinness}\nEI = {thinness}\nrhoA = 1\n\
+                 [[beam]]\nname = \"c\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 16\norder = 2\n\
+                 free_strain = [{}, 0, 0, 0, 0, 0]\n[[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"uz\"]\n\
+                 [[support]]\nat = \"b\"\nfix = [\"ux\", \"uy\", \"uz\"]\n[[stage]]\nkind = \"static\"\nsteps = 1\n\
+                 [[stage]]\nkind = \"modal\"\nmodes = 4\n",
+                list(random.direction() * length),
+                -tension / stretching
+            );
+            // Shear takes part of the tension where the axis turns, and sections do not: rhoA w^2 = k^2 T/(1 + T/GA).
+            let lowest = std::f64::consts::PI / length * (tension / (1.0 + tension / 400.0)).sqrt();
+            let expected = [lowest, lowest, 2.0 * lowest, 2.0 * lowest];
+            let found = modes(&text);
+            let fits = found.iter().zip(expected).all(|(mode, omega)| (mode.omega / omega - 1.0).abs() < 0.02);
+            assert!(found.len() == 4 && fits, "{found:?} for {expected:?}\n{text}");
+        }
+    }
+}
+
+/// A stiff beam on soft springs is not free, however soft they are.
+#[test]
+fn soft_springs_are_no_free_motions() {
+    let mut random = Random::new(62);
+    for softness in [1e-4_f64, 1e-7, 1e-9, 1e-10] {
+        let (axis, stretching) = (random.direction(), 1e6_f64);
+        let stiffness = softness * stretching;
+        let spring = |at: &str| {
+            format!("[[spring]]\nat = \"{at}\"\nstiffness = [{stiffness}, {stiffness}, {stiffness}, 0, 0, 0]\n")
+        };
+        let text = format!(
+            "[point]\na = {}\nb = {}\n[section.s]\nEA = {stretching}\nGA = {stretching}\nGJ = 50\nEI = 50\nrhoA = 1\n\
+             rhoJ = [1e-4, 1e-4, 1e-4]\n[[beam]]\nname = \"f\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 10\norder = 2\n\
+             {}{}[[stage]]\nkind = \"modal\"\nmodes = 8\n",
+            list(axis * -0.5),
+            list(axis * 0.5),
+            spring("a"),
+            spring("b")
+        );
+        let found = modes(&text);
+        assert_eq!(found.len(), 8, "{found:?}\n{text}");
+        // The spin about the axis, three translations of 2 k, two rotations of k/2 about the inertia 1/12; free-free bending.
+        let bounce = (2.0 * stiffness).sqrt();
+        let rocking = (0.5 * stiffness / (1.0 / 12.0 + 1e-4)).sqrt();
+        let bending = 22.373 * 50f64.sqrt();
+        let expected = [0.0, bounce, bounce, bounce, rocking, rocking, bending, bending];
+        for (mode, omega) in found.iter().zip(expected) {
+            // Bending takes part where springs are not soft beside it.
+            let near = (mode.omega - omega).abs() <= (5e-3 + 2.0 * stiffness / 50.0) * omega + 1e-6;
+            assert!(near && mode.growth.abs() < 1e-6, "{softness}: {found:?} for {expected:?}\n{text}");
+        }
+    }
+}
+
+/// More modes than there are may be asked for, and nothing is missing then.
+#[test]
+fn a_free_body_has_six_modes() {
+    let text = "[point]\na = [0.1, 0.2, 0.3]\n[[body]]\nat = \"a\"\nmass = 2\ninertia = [0.3, 0.5, 0.7]\noffset = [0.1, 0, 0.2]\n\
+                [[stage]]\nkind = \"modal\"\nmodes = 8\n";
+    let found = modes(text);
+    assert!(found.len() >= 6 && found[..6].iter().all(|mode| mode.omega == 0.0), "{found:?}");
+    assert!(attempt(text).counters.findings.warnings.is_empty());
+}
+
+/// A mode that is not exact enough to be listed is told.
+#[test]
+fn modes_that_fail_verification_are_told() {
+    // A free bow that a following thrust accelerates is not in balance.
+    let text = "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e5\nGA = 4e4\nGJ = 0.8\nEI = 1\nrhoA = 1\nrhoJ = [2e-4, 1e-4, 1e-4]\n\
+                [[beam]]\nname = \"f\"\nsection = \"s\"\narc = [\"a\", [0.5, 0.2, 0], \"b\"]\norder = 2\nelements = 8\n\
+                [[load]]\nat = \"a\"\nforce = [-0.5, 0, 0]\nframe = \"body\"\n[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 2e-3\n\
+                [[stage]]\nkind = \"modal\"\nmodes = 14\n";
+    let warned = attempt(text).counters.findings.warnings;
+    assert!(warned.iter().any(|warning| warning.kind == WarningKind::MissingModes), "{warned:?}");
 }
 
 /// A free beam that spins in a frame: what Coriolis forces couple with its free motions is listed as it was.

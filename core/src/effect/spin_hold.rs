@@ -17,7 +17,9 @@ pub struct SpinningPart {
     /// The axis of the part in the initial placement, a unit vector
     pub axis: Vec3,
     /// GJ/L, a moment per radian
-    pub stiffness: f64,
+    pub torsion: f64,
+    /// EA L, a moment per radian
+    pub stretching: f64,
 }
 
 /// The stiffness of the hold in load levels and time steps, over GJ/L: large enough that tolerated
@@ -28,6 +30,10 @@ const HOLD_RATIO: f64 = 1e-3;
 /// The stiffness of the hold in tangents without mass, over GJ/L: small enough that modes do not
 /// change.
 const HOLD_RATIO_IN_MODES: f64 = 1e-8;
+
+/// The least stiffness of the hold, over EA L: where GJ is tiny, the spin would be lost in the round-off
+/// of what resists stretching and shear.
+const LEAST_HOLD_RATIO: f64 = 1e-14;
 
 /// The stages in which spins are held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,12 +94,13 @@ impl Effect for SpinHold {
             return;
         }
         let among_modes = self.held_in == HeldIn::Motion && weights.mass == 0.0;
-        let hold = weights.stiffness * if among_modes { HOLD_RATIO_IN_MODES } else { HOLD_RATIO };
+        let ratio = if among_modes { HOLD_RATIO_IN_MODES } else { HOLD_RATIO };
         let mut system = ElementSystem::new(1);
         for (k, part) in self.parts.iter().enumerate() {
             system.clear();
             let about = at.rotation(part.node.p).t.transpose_mul(part.axis);
-            system.add_tangent(0, 0, about.outer(about).scale(part.stiffness * hold));
+            let hold = (ratio * part.torsion).max(LEAST_HOLD_RATIO * part.stretching);
+            system.add_tangent(0, 0, about.outer(about).scale(weights.stiffness * hold));
             out.add(k, &system);
         }
     }

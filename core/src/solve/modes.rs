@@ -13,6 +13,10 @@ use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 /// its norm.
 const DEPENDENT_RIGID_RATIO: f64 = 1e-6;
 
+/// A motion is massless if its mass is below this part of the heaviest entry of M, with displacements in lengths of the
+/// scene and rotations in radians: what a rotation about the axis of a pinned cable moves is round-off.
+const NEGLIGIBLE_MASS_RATIO: f64 = 1e-20;
+
 /// Largest relative residual of an eigenvector.
 const MAX_RESIDUAL: f64 = 1e-5;
 
@@ -42,8 +46,9 @@ const ROUGH_EXPONENTS: usize = 6;
 /// The imaginary part of a decay in a rough estimate, over its size.
 const ROUGHLY_REAL: f64 = 1e-3;
 
-/// Eigenvalues of a rough estimate below this part of the largest are round-off.
-const SMALLEST_ROUGH_PART: f64 = 1e-15;
+/// Eigenvalues of the operator below this part of the largest are round-off where they fail verification, and in rough
+/// estimates.
+const NEGLIGIBLE_PART: f64 = 1e-10;
 
 /// Relative uncertainty of a frequency by round-off above which it is computed again from strains.
 const MAX_UNCERTAINTY: f64 = 1e-9;
@@ -152,6 +157,8 @@ pub struct ModeSearch<'a> {
     is_ready: bool,
     /// Number of negative pivots of K + shift^2 M, for symmetric K
     negative: Option<usize>,
+    /// Exponents of motions that the last search has found, but that failed verification
+    pub(crate) dropped: Vec<Complex<f64>>,
     /// Number of factorisations so far
     pub(crate) factorisations: u64,
 }
@@ -231,8 +238,16 @@ impl<'a> ModeSearch<'a> {
             shift: 0.0,
             is_ready: false,
             negative: None,
+            dropped: Vec::new(),
             factorisations: 0,
         };
+        let has_mass = |motion: &Vec<f64>| {
+            let size = motion.iter().zip(&scales).filter(|(_, scale)| **scale > 0.0);
+            let size = size.map(|(part, scale)| (part / scale).abs()).fold(0.0, f64::max);
+            let mass = dot(motion, &search.system.multiply(&matrices.mass, motion));
+            mass > NEGLIGIBLE_MASS_RATIO * heaviest * size * size
+        };
+        let rigid: Vec<Vec<f64>> = rigid.into_iter().filter(has_mass).collect();
         rigid.into_iter().for_each(|motion| search.take_out(motion));
         // Only where K is symmetric is r.K = 0, as r.(C x + M s x) = 0 needs it, and only where C is, is r.C = C r.
         if damped && symmetric && is_symmetric(&search.system.pattern, &matrices.damping) {
@@ -409,7 +424,7 @@ impl<'a> ModeSearch<'a> {
         let mut before = f64::NAN;
         for _ in 0..INVERSE_ITERATIONS {
             x = weighed;
-            if !self.solver.solve_once(self.system, &mut x) {
+            if !self.solver.solve_for_modes(self.system, &mut x) {
                 return None;
             }
             weighed = self.system.multiply(&self.matrices.mass, &x);
@@ -427,8 +442,8 @@ impl<'a> ModeSearch<'a> {
         let diagonal = self.inner_product();
         let values = roughly_largest_eigenvalues(&mut ModeOperator { search: self, diagonal })?;
         // Only the first few are nearly right.
-        let largest = values.iter().map(|theta| theta.norm()).fold(0.0, f64::max);
-        let is_there = |theta: &Complex<f64>| theta.norm() > SMALLEST_ROUGH_PART * largest;
+        let largest = self.usual_value().max(largest_of(&values));
+        let is_there = |theta: &Complex<f64>| theta.norm() > NEGLIGIBLE_PART * largest;
         // Decays of damped rigid motions may be far slower than all else, and would draw the shift to where digits are lost.
         let mut decays = self.damped_rigid.len();
         let there = values.into_iter().filter(is_there).take(ROUGH_EXPONENTS + decays);
@@ -439,6 +454,14 @@ impl<'a> ModeSearch<'a> {
             !is_decay
         });
         Some(exponents.into_iter().map(|s| s.norm()).collect())
+    }
+
+    /// The eigenvalue of the operator for a motion of the size of the shift: it has parts of round-off of that size.
+    fn usual_value(&self) -> f64 {
+        match self.form {
+            ProblemForm::Symmetric | ProblemForm::Undamped => 1.0 / (self.shift * self.shift),
+            ProblemForm::Gyroscopic | ProblemForm::General => 1.0 / self.shift,
+        }
     }
 
     /// See [`ModeOperator::diagonal`].
@@ -457,7 +480,7 @@ impl<'a> ModeSearch<'a> {
         if !operator.is_symmetric() {
             spectrum.mend_vectors()?;
         }
-        let mut right = Vec::new();
+        let (mut right, mut failed) = (Vec::new(), Vec::new());
         for number in 0..spectrum.values.len() {
             let theta = spectrum.values[number];
             if theta.norm() == 0.0 || !operator.search.is_told(theta) {
@@ -465,6 +488,8 @@ impl<'a> ModeSearch<'a> {
             }
             if spectrum.residual(&mut operator, number)? <= operator.search.allowed_residual() {
                 right.push(number);
+            } else {
+                failed.push(number);
             }
         }
         self.look_at_stiffness();
@@ -473,12 +498,20 @@ impl<'a> ModeSearch<'a> {
             if interrupt::is_requested() {
                 return None;
             }
-            let Some(motion) = self.motion(&spectrum, number) else { continue };
+            let Some(motion) = self.motion(&spectrum, number) else {
+                failed.push(number);
+                continue;
+            };
             let twin = self.exponents(spectrum.values[number]).1;
             let twin = twin.map(|exponent| SmallMotion { exponent, ..motion.clone() });
             motions.push(motion);
             motions.extend(twin);
         }
+        let largest = self.usual_value().max(largest_of(&spectrum.values));
+        let failed = failed.into_iter().map(|number| spectrum.values[number]);
+        let failed = failed.filter(|theta| theta.norm() > NEGLIGIBLE_PART * largest);
+        let exponents = failed.map(|theta| self.form.exponent(self.shift, theta));
+        self.dropped = exponents.filter(|exponent| exponent.norm() > FREE_MOTION_RATIO * self.shift).collect();
         Some(motions)
     }
 
@@ -658,7 +691,7 @@ impl Operator for ModeOperator<'_, '_> {
         if !doubled {
             // The inner product is that of M.
             let mut out = weighed.to_vec();
-            let done = solver.solve_once(system, &mut out);
+            let done = solver.solve_for_modes(system, &mut out);
             self.search.project(&mut out);
             return done.then_some(out);
         }
@@ -667,7 +700,7 @@ impl Operator for ModeOperator<'_, '_> {
         let mass = system.multiply(&matrices.mass, &scaled);
         let damping = system.multiply(&matrices.damping, r1);
         let mut out: Vec<f64> = mass.iter().zip(&damping).map(|(m, c)| -(m + c)).collect();
-        if !solver.solve_once(system, &mut out) {
+        if !solver.solve_for_modes(system, &mut out) {
             return None;
         }
         let mut second: Vec<f64> = out.iter().zip(r1).map(|(x, r)| x + r / e).collect();
@@ -715,6 +748,11 @@ fn root(square: Complex<f64>) -> Complex<f64> {
         Complex { re, im: 0.0 } => Complex::new(re.sqrt(), 0.0),
         _ => square.sqrt(),
     }
+}
+
+/// The size of the largest of some eigenvalues.
+fn largest_of(values: &[Complex<f64>]) -> f64 {
+    values.iter().map(|theta| theta.norm()).fold(0.0, f64::max)
 }
 
 /// The largest entry, its row and column in their scales.

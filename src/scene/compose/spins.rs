@@ -106,12 +106,13 @@ impl Composer<'_> {
         }
         let beam = beams[0];
         let middle = beams[0].nodes.len() / 2;
-        let torsion = beam.section.at(beam.fractions[middle]).stiffness[3][3];
+        let stiffness = beam.section.at(beam.fractions[middle]).stiffness;
         let hold = SpinningPart {
             node: nodes[middle].node,
             nodes: nodes.iter().map(|node| node.node).collect(),
             axis,
-            stiffness: torsion / length,
+            torsion: stiffness[3][3] / length,
+            stretching: stiffness[0][0] * length,
         };
         Some(StraightPart { beams, ends: [first_end.node.p, second_end.node.p], hold })
     }

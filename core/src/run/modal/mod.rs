@@ -112,7 +112,7 @@ impl Modal<'_, '_> {
 
     fn find(&mut self, matrices: &Matrices) -> Result<Found, Failure> {
         let StageRun { assembly, model, state, plan, .. } = &*self.stage;
-        let mut rigid = rigid_motions(&assembly.system, model, state, &plan.places);
+        let mut rigid = rigid_motions(assembly, model, state, &plan.places);
         rigid.extend(free_spins(&assembly.system, model, state));
         self.refuse_massless_mechanisms(matrices)?;
         let moment = self.stage.moment();
@@ -180,8 +180,9 @@ impl Modal<'_, '_> {
         }
         if found.is_short {
             let message = format!(
-                "stage {stage}: at least one of the requested modes was not found: the number of negative pivots shows \
-                 more (very slender beams on very fine meshes lose digits: use fewer elements of a higher order)"
+                "stage {stage}: at least one of the requested modes was not found, or is not exact enough to be listed \
+                 (soft springs beside stiff beams, and very slender beams on very fine meshes, lose digits: use fewer \
+                 elements of a higher order)"
             );
             self.stage.warn(WarningKind::MissingModes, message);
         }

@@ -11,19 +11,29 @@
 //! It holds in balance and out of it, under pretension and under following loads, but for dead
 //! loads that turning changes.
 
-use crate::effect::SomeIncrements;
-use crate::model::Model;
+use crate::effect::{Effect, SomeIncrements};
+use crate::kernel::Weights;
+use crate::model::{Assembly, Model};
 use crate::rotation::Rotation;
 use crate::system::{Node, State, System};
 use crate::tensor::Vec3;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SVD};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A motion is held where it moves a held direction by more than this part of itself.
 const HELD: f64 = 1e-7;
 
 /// Forces against a motion that are smaller than this part of their terms are round-off.
 const NO_FORCE: f64 = 1e-11;
+
+/// An unknown that a motion moves by round-off only is taken to move by this part of its motion in the others, so that
+/// round-off in its forces is not compared with itself.
+const LEAST_PART: f64 = 1e-4;
+
+/// Terms of some effects count as at least this part of those of all effects: loads that have gone back to round-off are
+/// none.
+const LEAST_OF_ALL: f64 = 1e-3;
 
 /// Parts in a scene of more are not looked at: each look goes over all unknowns. Their rigid
 /// motions are found as other slow modes are.
@@ -59,14 +69,43 @@ pub fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>
     found
 }
 
-/// The rigid motions of all free parts, one number an equation each. The system holds forces and
+/// The rigid motions of all free parts, one number an equation each. The assembly holds forces and
 /// stiffness of the state.
-pub fn rigid_motions(system: &System, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
-    let parts = parts(system, places);
+pub fn rigid_motions(assembly: &Assembly, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
+    let parts = parts(&assembly.system, places);
     if parts.len() > MOST_PARTS {
         return Vec::new();
     }
-    parts.iter().flat_map(|part| FreePart::new(part, system, model, state).motions()).collect()
+    let loose: Vec<(FreePart, DMatrix<f64>)> = parts
+        .iter()
+        .filter_map(|part| {
+            let part = FreePart::new(part, &assembly.system, model, state);
+            let allowed = null_space(part.held(), HELD * HELD)?;
+            Some((part, allowed))
+        })
+        .collect();
+    if loose.is_empty() {
+        return Vec::new();
+    }
+    // A soft spring is round-off beside stiff beams, but not beside all else, which is looked at first.
+    let others = all_but_beams(assembly, model, state);
+    let motions = loose.into_iter().filter_map(|(part, allowed)| {
+        let free = FreePart { system: &others.system, ..part }.unresisted(allowed)?;
+        let free = part.unresisted(free)?;
+        Some(combine(&part.fields(), &free))
+    });
+    motions.flatten().collect()
+}
+
+/// Forces and stiffness of all effects without the elasticity of beams, which resists no rigid motion, and without the
+/// holds of spins. Loads that beams balance are alone in it.
+fn all_but_beams(assembly: &Assembly, model: &Model, state: &State) -> Assembly {
+    let is_other = |effect: &Arc<dyn Effect>| effect.roles().stresses.is_none() && effect.roles().spins.is_none();
+    let effects = model.acting(&assembly.stage).into_iter().filter(is_other).collect();
+    let pairs = state.contacts.pairs.list.clone();
+    let mut others = Assembly::of(effects, &assembly.stage, assembly.system.pattern.dof_map.clone(), model, pairs);
+    others.evaluate(state, Weights::STIFFNESS, None);
+    others
 }
 
 /// Nodes that are connected, by what acts between them.
@@ -97,9 +136,13 @@ fn parts(system: &System, places: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
 }
 
 /// A free part of a structure in a state: nodes that are connected.
+#[derive(Clone, Copy)]
 struct FreePart<'p> {
     nodes: &'p [(Node, Vec3)],
+    /// The forces and the stiffness that are looked at
     system: &'p System,
+    /// Those of all effects
+    whole: &'p System,
     state: &'p State,
     centre: Vec3,
     /// The distance of the farthest node from the centre; turns are measured by what they move, so
@@ -113,18 +156,22 @@ impl<'p> FreePart<'p> {
         let centre = nodes.iter().fold(Vec3::ZERO, |sum, node| sum + now(node)) * (1.0 / nodes.len() as f64);
         let extent = nodes.iter().map(|node| (now(node) - centre).norm()).fold(0.0, f64::max);
         let extent = if extent > 0.0 { extent } else { model.length };
-        Self { nodes, system, state, centre, extent }
+        Self { nodes, system, whole: system, state, centre, extent }
     }
 
-    /// The motions against which nothing acts, one number an equation.
-    fn motions(&self) -> Vec<Vec<f64>> {
-        let Some(allowed) = null_space(self.held(), HELD * HELD) else { return Vec::new() };
-        let fields: Vec<Vec<f64>> = (0..MOTIONS).map(|number| self.field(number)).collect();
-        let combined = combine(&fields, &allowed);
-        let Some(free) = null_space(self.resisted(&combined, &allowed), NO_FORCE * NO_FORCE) else {
-            return Vec::new();
-        };
-        combine(&combined, &free)
+    /// The combinations of the columns of `allowed` against which nothing acts; `None` where there are none.
+    fn unresisted(&self, allowed: DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let combined = combine(&self.fields(), &allowed);
+        let SVD { singular_values, v_t, .. } = self.resisted(&combined, &allowed).svd(false, true);
+        let v = v_t?.transpose();
+        let is_free = |k: &usize| singular_values[*k] <= NO_FORCE;
+        let free: Vec<_> = (0..singular_values.len()).filter(is_free).map(|k| v.column(k).into_owned()).collect();
+        (!free.is_empty()).then(|| allowed * DMatrix::from_columns(&free))
+    }
+
+    /// The motions of the part, one number an equation each.
+    fn fields(&self) -> Vec<Vec<f64>> {
+        (0..MOTIONS).map(|number| self.field(number)).collect()
     }
 
     /// The size of a motion as it is measured.
@@ -174,12 +221,16 @@ impl<'p> FreePart<'p> {
         out
     }
 
-    /// The Gram matrix of the forces against motions, which are combined with the columns of
-    /// `allowed`; each force over its terms.
+    /// The forces against motions, which are combined with the columns of `allowed`, each over its terms: the triangle R
+    /// of their factorisation Q R.
     fn resisted(&self, motions: &[Vec<f64>], allowed: &DMatrix<f64>) -> DMatrix<f64> {
         let system = self.system;
         let count = system.pattern.dof_map.count();
         let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
+        let all_sizes: Vec<f64> = self.whole.values.iter().map(|v| v.abs()).collect();
+        let fields = self.fields();
+        let usual: Vec<f64> =
+            (0..count).map(|k| fields.iter().map(|field| field[k].abs()).fold(0.0, f64::max)).collect();
         let mut scale = vec![0.0_f64; count];
         let mut forces: Vec<Vec<f64>> = Vec::new();
         for (k, motion) in motions.iter().enumerate() {
@@ -187,23 +238,25 @@ impl<'p> FreePart<'p> {
             let turn = Vec3([3, 4, 5].map(|number| allowed[(number, k)] / self.extent));
             let expected = self.turned_forces(motion, turn);
             force.iter_mut().zip(&expected).for_each(|(force, expected)| *force -= expected);
-            let absolute: Vec<f64> = motion.iter().map(|v| v.abs()).collect();
+            let absolute: Vec<f64> =
+                motion.iter().zip(&usual).map(|(v, usual)| v.abs().max(LEAST_PART * usual)).collect();
             let terms = system.multiply(&sizes, &absolute);
+            let all_terms = self.whole.multiply(&all_sizes, &absolute);
             scale
                 .iter_mut()
-                .zip(terms)
+                .zip(terms.iter().zip(&all_terms))
                 .zip(&expected)
-                .for_each(|((scale, term), e)| *scale = scale.max(term + e.abs()));
+                .for_each(|((scale, (term, all)), e)| *scale = scale.max(term + e.abs()).max(LEAST_OF_ALL * all));
             forces.push(force);
         }
-        let mut resisted = DMatrix::<f64>::zeros(forces.len(), forces.len());
-        for row in (0..count).filter(|&row| scale[row] > 0.0) {
-            let parts: Vec<f64> = forces.iter().map(|force| force[row] / scale[row]).collect();
-            for (i, a) in parts.iter().enumerate() {
-                parts.iter().enumerate().for_each(|(j, b)| resisted[(i, j)] += a * b);
-            }
-        }
-        resisted
+        let part = |row: usize, k: usize| if scale[row] > 0.0 { forces[k][row] / scale[row] } else { 0.0 };
+        // Squares would lose half of the digits: the triangle of a factorisation does not.
+        let all = DMatrix::from_fn(
+            count.max(forces.len()),
+            forces.len(),
+            |row, k| if row < count { part(row, k) } else { 0.0 },
+        );
+        all.qr().r()
     }
 
     /// The change of the forces on the part where they turn with it, one number an equation.

@@ -30,6 +30,12 @@ const SAME: f64 = 1e-6;
 /// Motions slower than this part of the others tell nothing of their frequencies.
 const FREE: f64 = 1e-4;
 
+/// The part of |s| from which on a motion that failed verification may grow.
+const SURELY_GROWS: f64 = 1e-3;
+
+/// Motions are searched from a shift of their own if that is so many times higher.
+const FAR_ABOVE: f64 = 10.0;
+
 /// The modes of a stage, and what is known about them.
 #[derive(Default)]
 pub struct Found {
@@ -38,7 +44,7 @@ pub struct Found {
     pub(super) rigid: usize,
     /// Unstable modes that are known to be there and were not found
     pub(super) missing: usize,
-    /// Pivots count more among those that are asked for than were found.
+    /// Pivots count more among those that are asked for than were found, or some of them failed verification.
     pub(super) is_short: bool,
 }
 
@@ -123,6 +129,7 @@ fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> 
         let is_held = search.is_held();
         found.motions = search.nearest(modes + SPARE)?;
         let exponents: Vec<Complex<f64>> = found.motions.iter().map(|motion| motion.exponent).collect();
+        found.is_short = dropped_among(search, &found, modes);
         for further in unseen(search, &exponents, shift).filter(|_| !is_held) {
             add_new(&mut found.motions, growing_from(search, further, SPARE));
         }
@@ -130,9 +137,11 @@ fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> 
     };
     let mut wanted = modes + unstable + 2;
     for _ in 0..MOST_SEARCHES {
-        found.motions = look(search, shift, wanted)?;
+        found.motions = look_in_parts(search, shift, wanted)?;
         if found.growing() < unstable {
+            let dropped = search.dropped.clone();
             find_growing(search, shift, &mut found, unstable);
+            search.dropped = dropped;
         }
         found.missing = unstable.saturating_sub(found.growing());
         found.is_short = found.missing == 0 && !is_complete(search, &found, modes);
@@ -190,6 +199,22 @@ fn look(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Vec<SmallM
     if search.factorise(shift) { search.nearest(wanted) } else { None }
 }
 
+/// The motions nearest to a shift. Where far slower ones take the digits of others, these are searched from a shift of
+/// their own. `None` where a solution fails.
+fn look_in_parts(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Vec<SmallMotion>> {
+    let mut motions = look(search, shift, wanted)?;
+    let slowest = search.dropped.iter().map(|exponent| exponent.norm()).fold(f64::INFINITY, f64::min);
+    if !slowest.is_finite() || SHIFT * slowest < FAR_ABOVE * shift {
+        return Some(motions);
+    }
+    let is_slow = |motion: &SmallMotion| motion.exponent.norm() < 0.5 * slowest;
+    let others = look(search, SHIFT * slowest, wanted)?;
+    search.dropped.retain(|exponent| exponent.norm() >= 0.5 * slowest);
+    motions.retain(|motion| is_slow(motion) || grows(motion));
+    motions.extend(others.into_iter().filter(|motion| !is_slow(motion) && !grows(motion)));
+    Some(motions)
+}
+
 /// The motions nearest to a shift that grow; none where the shift hits a motion.
 fn growing_from(search: &mut ModeSearch, shift: f64, wanted: usize) -> Vec<SmallMotion> {
     look(search, shift, wanted).unwrap_or_default().into_iter().filter(grows).collect()
@@ -224,9 +249,21 @@ fn is_complete(search: &mut ModeSearch, found: &Found, modes: usize) -> bool {
     let first = modes.saturating_sub(found.rigid + found.growing()).max(1);
     // The widest gap behind the last mode that is asked for.
     let gaps = (first..omegas.len()).map(|k| (omegas[k] - omegas[k - 1], k));
-    let Some((gap, behind)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0)) else { return true };
+    let Some((gap, behind)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0)) else {
+        return !dropped_among(search, found, modes);
+    };
     let at = omegas[behind] - 0.5 * gap;
     gap <= SAME * at || search.slower(at).is_none_or(|count| count == found.rigid + found.growing() + behind)
+}
+
+/// True if motions that failed verification in the last search may be among those that are asked for, or grow.
+fn dropped_among(search: &ModeSearch, found: &Found, modes: usize) -> bool {
+    let mut sizes: Vec<f64> = found.motions.iter().map(|motion| motion.exponent.norm()).collect();
+    sizes.extend(std::iter::repeat_n(0.0, found.rigid));
+    sort_numbers(&mut sizes);
+    let last = modes.checked_sub(1).map_or(0.0, |last| sizes.get(last).copied().unwrap_or(f64::INFINITY));
+    let is_listed = |exponent: &Complex<f64>| exponent.norm() < last || exponent.re > SURELY_GROWS * exponent.norm();
+    search.dropped.iter().any(is_listed)
 }
 
 /// The slowest motion that something holds.
