@@ -10,7 +10,7 @@ mod spectrum;
 mod walk;
 
 use self::search::{CriticalSearch, Sight};
-use self::spectrum::{critical_loads, negative_pivots, next_critical_load, rank};
+use self::spectrum::{critical_loads, negative_pivots, next_critical_load, rank, unpaired_critical_loads};
 use self::walk::{Walked, continue_path, has_leapt};
 use super::distance::distance;
 use super::failure::Failure;
@@ -64,7 +64,7 @@ const SAME_LIMIT: f64 = 1e-6;
 /// A critical load on its path.
 struct Found {
     critical: CriticalLoad,
-    /// True if it is a limit point at which load control has ended
+    /// True if load control has ended there on its way, at a limit point or where an imperfection turns the path aside
     ends_path: bool,
 }
 
@@ -86,11 +86,11 @@ struct Response {
 /// The limit of a path above the present load, or below it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum PathLimit {
-    /// The last critical load, if there is one, is no limit point.
+    /// The last critical load, if there is one, does not end the path by load control.
     Open,
-    /// The last critical load is a limit point, at this load.
+    /// The last critical load ends it, at this load.
     At(f64),
-    /// The search for the next critical load has come to the same limit point: none lies before it.
+    /// The search for the next critical load has come to the same load: none lies before it.
     Reached,
 }
 
@@ -99,10 +99,10 @@ impl PathLimit {
     fn after(self, next: &Found) -> Self {
         let Found { critical: CriticalLoad { load, kind }, ends_path } = *next;
         let is_same = |limit: f64| ends_path && (load - limit).abs() < SAME_LIMIT * limit.abs();
-        match (self, kind) {
-            (Self::At(limit), _) if is_same(limit) => Self::Reached,
-            (_, CriticalKind::Limit) => Self::At(load),
-            (_, CriticalKind::Branch | CriticalKind::Estimate) => Self::Open,
+        match self {
+            Self::At(limit) if is_same(limit) => Self::Reached,
+            _ if ends_path || kind == CriticalKind::Limit => Self::At(load),
+            Self::Open | Self::At(_) | Self::Reached => Self::Open,
         }
     }
 }
@@ -197,22 +197,29 @@ impl Buckling<'_, '_> {
         let mut search = CriticalSearch::new(self.stage.state.clone(), estimate);
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
-                let off = if search.ended.is_some() { self.foreseen(&search, found, before)? } else { 0.0 };
-                if off > FORESEEN && self.goes_on(&search, found, none.map(|none| none + before))? {
-                    if off < ASIDE {
-                        self.warn_of_turn_aside(found);
+                let ended = search.ended.is_some();
+                let goes_on = ended && self.goes_on(&search, found, none.map(|none| none + before))?;
+                if goes_on {
+                    let behind = self.stage.state.clone();
+                    let off = self.foreseen(&search, found, before)?;
+                    if off > FORESEEN {
+                        if off < ASIDE {
+                            self.warn_of_turn_aside(found);
+                        }
+                        // A step from further away came down elsewhere, or nowhere.
+                        self.stage.go_back_to(&behind)?;
+                        let ahead = next_critical_load(self.stage, search.way, before)?;
+                        search.go_on_from(self.stage.state, ahead);
+                        continue;
                     }
-                    // A step from further away came down elsewhere, or nowhere.
-                    let ahead = next_critical_load(self.stage, search.way, before)?;
-                    search.go_on_from(self.stage.state, ahead);
-                    continue;
                 }
                 let is_apart = |behind: &State| distance(self.stage.model, &search.here, behind) > APART;
                 if search.is_a_limit(found) && !search.behind.as_ref().is_some_and(is_apart) {
                     self.stage.state.copy_from(&search.here);
                     self.stage.judge_mesh()?;
-                    let kind = self.kind_of_critical(&at_start)?;
-                    let ends_path = kind == CriticalKind::Limit && search.ended.is_some();
+                    // A path that goes on has no limit point: an imperfection turns it aside next to a bifurcation.
+                    let kind = if goes_on { CriticalKind::Branch } else { self.kind_of_critical(&at_start)? };
+                    let ends_path = ended && (goes_on || kind == CriticalKind::Limit);
                     return Ok(Found { critical: CriticalLoad { load: found, kind }, ends_path });
                 }
                 break;
@@ -248,7 +255,7 @@ impl Buckling<'_, '_> {
     /// as if it had, the more sharply the smaller the imperfection.
     fn foreseen(&mut self, search: &CriticalSearch, load: f64, before: usize) -> Result<f64, Failure> {
         self.stage.state.copy_from(&search.here);
-        let seen = critical_loads(self.stage, before + 4)?;
+        let seen = unpaired_critical_loads(self.stage, before + 4)?;
         Ok(seen.into_iter().map(|seen| (seen - load).abs() / load.abs()).fold(f64::INFINITY, f64::min))
     }
 

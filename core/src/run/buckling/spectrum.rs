@@ -18,6 +18,9 @@ const PROBE: f64 = 1e-5;
 /// little.
 const REAL: f64 = 1e-3;
 
+/// Two critical loads whose distances from the present load differ by less, relative to these, are a pair.
+const PAIRED: f64 = 0.05;
+
 /// The number of negative pivots of the tangent at the present state; `None` where it is not
 /// symmetric.
 pub fn negative_pivots(stage: &mut StageRun) -> Option<usize> {
@@ -33,6 +36,18 @@ pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Fa
         nearest_critical_loads(stage, modes, &|ahead| ahead.iter().filter(|&&ahead| ahead > 0.0).count() >= modes)?;
     loads.truncate(modes);
     Ok(loads)
+}
+
+/// The critical loads on both sides of the present one, as they look from the present state, without pairs at equal
+/// distances. Where the path turns stiff directions fast, K + m K' is singular at some +m and -m, though the tangent on
+/// the path is not: K' has terms of EA in bending then, and no square of them in K.
+pub fn unpaired_critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Failure> {
+    let load = stage.state.load;
+    let is_enough = |ahead: &[f64]| ahead.iter().filter(|&&ahead| ahead > 0.0).count() >= modes;
+    let loads = nearest_critical_loads(stage, modes, &is_enough)?;
+    let is_pair = |a: f64, b: f64| (a + b).abs() < PAIRED * a.abs();
+    let is_paired = |critical: f64| loads.iter().any(|other| is_pair(critical - load, other - load));
+    Ok(loads.iter().copied().filter(|&critical| !is_paired(critical)).collect())
 }
 
 /// The critical load with `before` others between it and the present one in the direction `way`, as it looks from
@@ -125,7 +140,7 @@ impl Operator for Softening<'_> {
     fn apply(&mut self, x: &[f64], _weighed: &[f64]) -> Option<Vec<f64>> {
         let mut out = self.system.multiply(self.varied, x);
         out.iter_mut().for_each(|v| *v = -*v);
-        self.solver.solve_once(self.system, &mut out).then_some(out)
+        self.solver.solve_for_modes(self.system, &mut out).then_some(out)
     }
 
     fn weigh(&mut self, x: &[f64]) -> Vec<f64> {
