@@ -49,6 +49,15 @@ pub enum HistoryBody {
     Expression(Expression),
 }
 
+impl HistoryBody {
+    /// The shortest interval in which a smooth table changes; `None` for others.
+    pub fn shortest_smooth_step(&self) -> Option<f64> {
+        let Self::Table { times, values, smooth: true } = self else { return None };
+        let changes = times.windows(2).zip(values.windows(2)).filter(|(_, values)| values[0] != values[1]);
+        changes.map(|(times, _)| times[1] - times[0]).reduce(f64::min)
+    }
+}
+
 /// Keys of `[history.NAME]`.
 pub(super) const KEYS: [&str; 6] = ["times", "values", "smooth", "expr", "csv", "column"];
 /// Keys of `history = { … }`.

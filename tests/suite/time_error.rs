@@ -264,6 +264,20 @@ fn an_accuracy_that_is_missed_has_a_status_of_its_own_and_the_best_is_written() 
     assert!(!read("history.csv").is_empty());
 }
 
+/// Steps over the whole of a smooth motion see nothing of it, and two of them agree: shorter ones are taken from the start.
+#[test]
+fn an_accuracy_is_kept_where_motions_are_shorter_than_steps() {
+    let folder = Folder::new("short_motion");
+    let deck = format!("{}/decks/dynamics/pin_that_moves_within_a_step.toml", env!("CARGO_MANIFEST_DIR"));
+    let output = folder.beamsim(&["run", &deck, "--accuracy", "1e-3", "--out", "out"]);
+    assert_eq!(status(&output), 0, "{}", last_line(&output));
+    let history = HistoryReader::read(&folder.0.join("out/history.csv")).unwrap();
+    let column = history.names.iter().position(|name| name == "p.ry").unwrap();
+    let came = history.rows.last().unwrap()[column];
+    // (J + m l^2) w' = -m g l sin + m l a cos, by a Runge-Kutta method of order 8.
+    assert!((came.abs() - 0.51971).abs() <= 1e-3 * 0.7468, "{came} for 0.51971");
+}
+
 /// The middle of an arc is a node of the deck's mesh, and of those that are chosen.
 #[test]
 fn an_accuracy_is_kept_at_nodes_that_other_meshes_do_not_have() {

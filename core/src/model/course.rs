@@ -296,7 +296,7 @@ impl<'a> Timeline<'a> {
         }
     }
 
-    /// The first time behind `time` at which it takes another course.
+    /// The first time behind `time` at which it takes another course, or bends most.
     pub fn next_corner(&self, time: f64) -> Option<f64> {
         self.dynamic_history()?.next_corner(&self.progress.clock, time)
     }
@@ -304,6 +304,12 @@ impl<'a> Timeline<'a> {
     /// The first time behind `time` at which its rate jumps.
     pub fn next_kink(&self, time: f64) -> Option<f64> {
         self.dynamic_history()?.next_kink(&self.progress.clock, time)
+    }
+
+    /// The sum of the jumps of its rate after the time `from` and up to `to`.
+    pub fn jumped(&self, from: f64, to: f64) -> f64 {
+        let jumps = |history: &Reading| history.jumped(&self.progress.clock, from, to);
+        self.dynamic_history().map_or(0.0, |history| self.amplitude.full * jumps(history))
     }
 
     /// Its rate just before `time`.

@@ -15,8 +15,8 @@ pub trait History: Send + Sync {
         self.at(x)[1]
     }
 
-    /// The first abscissa after `x` where the function is not smooth, or changes its formula;
-    /// `None` if there is none.
+    /// The first abscissa after `x` where the function is not smooth, changes its formula, or bends most between such
+    /// places; `None` if there is none.
     fn next_corner(&self, _x: f64) -> Option<f64> {
         None
     }
@@ -25,6 +25,11 @@ pub trait History: Send + Sync {
     /// none.
     fn next_kink(&self, _x: f64) -> Option<f64> {
         None
+    }
+
+    /// The sum of the jumps of the first derivative after `from` and up to `to`.
+    fn jumped(&self, _from: f64, _to: f64) -> f64 {
+        0.0
     }
 
     /// The largest magnitude of the first derivative, if it is known.
@@ -136,6 +141,11 @@ impl Reading {
         next_on_clock(clock, time, |x| self.function.next_kink(x))
     }
 
+    /// The sum of the jumps of the first derivative after the time `from` and up to `to`.
+    pub fn jumped(&self, clock: &HistoryClock, from: f64, to: f64) -> f64 {
+        self.function.jumped(from - clock.origin(), to - clock.origin())
+    }
+
     /// The largest magnitude of the first derivative, if it is known.
     pub fn fastest(&self) -> Option<f64> {
         self.function.fastest()
@@ -198,7 +208,18 @@ impl History for Table {
     }
 
     fn next_corner(&self, x: f64) -> Option<f64> {
-        self.times.get(self.times.partition_point(|&t| t <= x)).copied()
+        let next = self.times.partition_point(|&t| t <= x);
+        let end = *self.times.get(next)?;
+        if !self.smooth || next == 0 || self.values[next] == self.values[next - 1] {
+            return Some(end);
+        }
+        let start = self.times[next - 1];
+        let bends = BENDS.map(|part| start + part * (end - start));
+        Some(bends.into_iter().find(|&bend| bend > x).unwrap_or(end))
+    }
+
+    fn jumped(&self, from: f64, to: f64) -> f64 {
+        if self.smooth { 0.0 } else { self.at(to)[1] - self.at(from)[1] }
     }
 
     fn next_kink(&self, x: f64) -> Option<f64> {
@@ -219,6 +240,10 @@ impl History for Table {
         (0..self.times.len() - 1).map(|k| self.slope(k).abs()).reduce(f64::max)
     }
 }
+
+/// Where in its interval a smooth step bends most, nearly: neither the ends nor the middle of the interval show anything
+/// of its accelerations, which are zero there.
+const BENDS: [f64; 2] = [0.25, 0.75];
 
 /// The smallest noticeable jump of a velocity, over the largest velocity: smaller ones are those of
 /// a smooth motion sampled in a table.
@@ -255,6 +280,14 @@ mod tests {
             assert!((slope - (after[0] - before[0]) / (2.0 * h)).abs() < 1e-8);
             assert!((bend - (after[1] - before[1]) / (2.0 * h)).abs() < 1e-8);
         }
+    }
+
+    #[test]
+    fn a_smooth_table_tells_where_it_bends() {
+        let table = Table { times: vec![1.0, 2.0, 3.0], values: vec![0.0, 4.0, 4.0], smooth: true };
+        let corners: Vec<f64> =
+            std::iter::successors(table.next_corner(0.0), |&corner| table.next_corner(corner)).collect();
+        assert_eq!(corners, [1.0, 1.25, 1.75, 2.0, 3.0]);
     }
 
     #[test]

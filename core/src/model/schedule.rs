@@ -164,7 +164,7 @@ impl Schedule {
         Ok(())
     }
 
-    /// The first time behind `time` at which a load or a motion takes another course.
+    /// The first time behind `time` at which a load or a motion takes another course, or bends most.
     pub fn next_corner(&self, model: &Model, time: f64) -> Option<f64> {
         let timelines = self.loads(model).chain(self.motions(model).map(|(_, timeline)| timeline));
         timelines.filter_map(|timeline| timeline.next_corner(time)).min_by(f64::total_cmp)
@@ -194,6 +194,19 @@ impl Schedule {
             }
         }
         too_far
+    }
+
+    /// A state without the jumps that its prescribed velocities made after the time `from`; `None` where they made none.
+    pub fn without_jumps(&self, model: &Model, state: &State, from: f64) -> Option<State> {
+        let mut without = None;
+        for (motion, timeline) in self.motions(model) {
+            let jump = timeline.jumped(from, state.time);
+            if jump != 0.0 {
+                let [value, rate, rate2] = timeline.at(state.time, state.load);
+                motion.impose([value, rate - jump, rate2], without.get_or_insert_with(|| state.clone()));
+            }
+        }
+        without
     }
 
     fn held_directions(&self, model: &Model) -> Vec<Direction> {

@@ -77,9 +77,9 @@ pub enum JumpKind {
         /// The run's clock
         time: f64,
     },
-    /// Up and down between the ends of fixed time steps, which see nothing of it
+    /// Between the ends of fixed time steps, which do not see all of it
     BetweenSteps {
-        /// The share of the impulse that they miss
+        /// The share that they miss of the impulse of a load, or of the way of a motion
         part: f64,
     },
     /// It has no finite value, velocity or acceleration where the stage begins.
@@ -308,17 +308,34 @@ impl<'p> Rehearser<'p> {
         });
     }
 
-    /// Loads that change between the ends of fixed steps.
+    /// Loads, and velocities of motions and motors, that change between the ends of fixed steps.
     fn look_between_steps(&mut self, number: usize, steps: &TimeStepping) {
-        if steps.adaptive.is_some() || steps.end <= self.state.time {
+        let (time, jumps) = (self.state.time, &mut self.found.jumps);
+        if steps.adaptive.is_some() || steps.end <= time {
             return;
         }
-        for (k, timeline) in self.schedule.loads(self.model).enumerate() {
-            let value = |time| timeline.at(time, 1.0)[0];
-            let missed =
-                missed_part(value, |time| timeline.next_corner(time), [self.state.time, steps.end], steps.step);
+        let mut look = |timeline: Timeline, derivative: usize, what: Driven| {
+            // Loads act from the start of the stage on; velocities are all of the way. Kinks are told anyway.
+            let is_velocity = derivative > 0;
+            if is_velocity && timeline.next_kink(time).is_some() {
+                return;
+            }
+            let value = |time| timeline.at(time, 1.0)[derivative];
+            let first = if is_velocity { 0.0 } else { value(time) };
+            let missed = missed_part(value, |time| timeline.next_corner(time), first, [time, steps.end], steps.step);
             let how = missed.map(|part| JumpKind::BetweenSteps { part });
-            self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Amplitude(k), how }));
+            jumps.extend(how.map(|how| HistoryJump { stage: number, what, how }));
+        };
+        let mut of_motors = vec![None; self.model.amplitudes.len()];
+        self.model.each_motor(&self.state, &mut |motor| of_motors[motor.amplitude] = Some(motor.slot));
+        for (k, timeline) in self.schedule.loads(self.model).enumerate() {
+            match of_motors[k] {
+                None => look(timeline, 0, Driven::Amplitude(k)),
+                Some(slot) => look(timeline, 1, Driven::Motor(slot)),
+            }
+        }
+        for (k, (_, timeline)) in self.schedule.motions(self.model).enumerate() {
+            look(timeline, 1, Driven::Motion(k));
         }
     }
 

@@ -9,14 +9,14 @@ const ON_GRID: f64 = 1e-6;
 
 /// The largest error of the impulse up to some time that steps of the length `step` make between the
 /// times `from` and `to`, over the whole impulse; `None` if it is small. The impulse is that of the
-/// change of `value` from its start; corners are where `value` may bend, as `next_corner` tells them.
+/// change of `value` from `first`; corners are where `value` may bend, as `next_corner` tells them.
 pub fn missed_part(
     value: impl Fn(f64) -> f64,
     next_corner: impl Fn(f64) -> Option<f64>,
+    first: f64,
     [from, to]: [f64; 2],
     step: f64,
 ) -> Option<f64> {
-    let first = value(from);
     let change = |time: f64| value(time) - first;
     let corners = || {
         std::iter::successors(next_corner(from), |&corner| next_corner(corner)).take_while(move |&corner| corner < to)
@@ -62,7 +62,7 @@ mod tests {
 
     fn missed(times: &[f64], values: &[f64], smooth: bool, step: f64) -> Option<f64> {
         let table = Table { times: times.to_vec(), values: values.to_vec(), smooth };
-        missed_part(|time| table.at(time)[0], |time| table.next_corner(time), [0.0, 1.0], step)
+        missed_part(|time| table.at(time)[0], |time| table.next_corner(time), table.at(0.0)[0], [0.0, 1.0], step)
     }
 
     #[test]
@@ -74,6 +74,20 @@ mod tests {
         // Its middle is the end of a step: the sum of its values there is 3 for the impulse 1.5.
         let part = missed(&[0.47, 0.5, 0.53], &[0.0, 50.0, 0.0], false, 0.05).unwrap();
         assert!((part - 2.0 / 3.0).abs() < 1e-12, "{part}");
+    }
+
+    #[test]
+    fn steps_over_a_smooth_motion_miss_its_way() {
+        let missed = |times: &[f64], values: &[f64], smooth: bool, step: f64| {
+            let table = Table { times: times.to_vec(), values: values.to_vec(), smooth };
+            missed_part(|time| table.at(time)[1], |time| table.next_corner(time), 0.0, [0.0, 1.0], step)
+        };
+        assert_eq!(missed(&[0.5, 0.51], &[0.0, 1.0], true, 0.01), Some(1.0));
+        assert!(missed(&[0.5, 0.52], &[0.0, 1.0], true, 0.01).is_some());
+        assert_eq!(missed(&[0.5, 0.54], &[0.0, 1.0], true, 0.01), None);
+        // A constant speed in decimals.
+        let times = [0.0, 0.063, 0.118, 0.569, 0.761, 0.802, 1.0];
+        assert_eq!(missed(&times, &times.map(|time| 0.7 * time), false, 0.02), None);
     }
 
     #[test]

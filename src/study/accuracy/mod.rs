@@ -28,7 +28,7 @@ use super::StudyError;
 use super::change::Change;
 use super::cost::{Family, Mesher, Original, Pace, Patience, Pool, Sampler, StudyOptions, Variant, may_take_lobatto};
 use super::outputs;
-use crate::deck::{Accuracy, Beam, Deck, Diagnostic, InterpolationWord, StageBody};
+use crate::deck::{Accuracy, Beam, Deck, Diagnostic, HistoryUse, InterpolationWord, StageBody};
 use crate::scene::Scene;
 use crate::study::Outcome;
 use beamsim_core::run::Failure;
@@ -41,6 +41,11 @@ const CUBIC: f64 = 3e-3;
 const FIRST_STEP: f64 = 2.0;
 /// The smallest number of first steps in a stage.
 const LEAST_STEPS: f64 = 32.0;
+
+/// The smallest number of first steps in an interval of a smooth motion: one or two see nothing of its accelerations.
+const LEAST_IN_MOTION: f64 = 4.0;
+/// The smallest first step for such intervals, over that of the deck.
+const SHORTEST_FIRST_STEP: f64 = 1.0 / 64.0;
 
 /// The largest tolerance of Newton's method over the wanted error.
 const NEWTON: f64 = 1e-3;
@@ -181,18 +186,31 @@ fn scaled(pace: Pace, by: f64) -> Pace {
 /// The first pace: the longest steps that leave each stage enough of them.
 fn first_pace(deck: &Deck) -> Pace {
     let mut start = 0.0;
-    let mut fewest = f64::INFINITY;
+    let (mut fewest, mut longest) = (f64::INFINITY, 0.0_f64);
     for stage in &deck.stages {
         if let StageBody::Dynamic { end, step, .. } = stage.body {
             fewest = fewest.min((end - start) / step);
+            longest = longest.max(step);
             start = end;
         }
     }
     if fewest.is_infinite() {
         return Pace::Timeless;
     }
-    let factor = (fewest / LEAST_STEPS).log2().floor().exp2();
+    let in_motion = shortest_motion(deck) / (LEAST_IN_MOTION * longest);
+    let factor = (fewest / LEAST_STEPS).min(in_motion.max(SHORTEST_FIRST_STEP)).log2().floor().exp2();
     Pace::Steps(factor.min(FIRST_STEP))
+}
+
+/// The shortest interval in which a smooth table moves a motion or a motor; infinite without any.
+fn shortest_motion(deck: &Deck) -> f64 {
+    let motors = deck.joints.iter().filter_map(|joint| joint.motor.as_ref()?.history.as_ref());
+    let drives = deck.motions.iter().filter_map(|motion| motion.history.as_ref()).chain(motors);
+    let of_drive = |drive: &HistoryUse| {
+        let history = deck.histories.iter().find(|history| history.name.value == drive.name.value)?;
+        history.body.shortest_smooth_step()
+    };
+    drives.filter_map(of_drive).fold(f64::INFINITY, f64::min)
 }
 
 /// Refuses a deck whose `accuracy` names columns that have no error, or has no outputs with one.

@@ -113,6 +113,12 @@ impl Bookkeeper {
         }
     }
 
+    /// Adds the work of the impulses by which prescribed velocities jump, from a state without these jumps to one with
+    /// them.
+    pub fn add_impulse(&mut self, from: Entry, to: Entry) {
+        self.ledger.external += to.energy().kinetic - from.energy().kinetic;
+    }
+
     /// A stage begins whose work is not booked: the account begins anew behind it.
     pub fn close(&mut self) {
         self.first = None;
