@@ -23,6 +23,11 @@ const LOOSE_BALANCE: f64 = 1e-5;
 /// A motion below this, in lengths of the scene and radians, is round-off.
 const MOVED: f64 = 1e-12;
 
+/// The part of the strain energy from which on the energy of elastic stick is told.
+const MOST_HELD_BY_STICK: f64 = 0.05;
+/// The part of the energy of elastic stick below which strain energy is none: bodies on slopes strain nothing.
+const LEAST_STRAIN: f64 = 0.05;
+
 /// The way that friction may give, over the radius.
 const MOST_GIVEN: f64 = 0.2;
 
@@ -128,6 +133,25 @@ impl StageRun<'_> {
             "stage {stage} ends with contact \"{contact}\" held by friction whose elastic part has given way by \
              {way:.2e}, which is {share:.2} of the radius: friction builds up over about that way (give the contact a \
              larger `stick`)"
+        );
+        self.warn(WarningKind::SoftStick, message);
+    }
+
+    /// Parts that friction holds together are stiff only as far as its springs are.
+    pub fn warn_of_stick_that_gives(&mut self) {
+        let Some(contacts) = self.model.contacts() else { return };
+        let [held, strain] = [contacts.energy(self.state), self.model.energy(self.state).strain];
+        let is_soft = held > MOST_HELD_BY_STICK * strain && strain > LEAST_STRAIN * held;
+        let Some(ElasticStick { contact, .. }) = contacts.softest_stick(self.state).filter(|_| is_soft) else { return };
+        if std::mem::replace(&mut self.issued.soft_stick, true) {
+            return;
+        }
+        let stage = self.number + 1;
+        let percent = 100.0 * held / strain;
+        let message = format!(
+            "stage {stage} ends with parts that friction of contact \"{contact}\" holds together elastically: its springs \
+             store {percent:.0} % of the strain energy, and what they hold may be far too soft (use more elements, or give \
+             the contact a larger `stiffness`)"
         );
         self.warn(WarningKind::SoftStick, message);
     }
