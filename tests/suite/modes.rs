@@ -285,6 +285,10 @@ fn a_free_body_has_six_modes() {
     let found = modes(text);
     assert!(found.len() >= 6 && found[..6].iter().all(|mode| mode.omega == 0.0), "{found:?}");
     assert!(attempt(text).counters.findings.warnings.is_empty());
+    // Numbers whose products overflow come to an end, whatever it is.
+    for stiffness in ["1e308", "1e-308"] {
+        attempt(&format!("{text}[[spring]]\nat = \"a\"\nstiffness = [{stiffness}, 0, 0, 0, 0, 0]\n"));
+    }
 }
 
 /// A mode that is not exact enough to be listed is told.

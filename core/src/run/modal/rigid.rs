@@ -39,6 +39,9 @@ const LEAST_OF_ALL: f64 = 1e-3;
 /// motions are found as other slow modes are.
 const MOST_PARTS: usize = 64;
 
+/// Sweeps for the decomposition of six columns, at most.
+const MOST_SWEEPS: usize = 1000;
+
 /// Directions of motion of one free part.
 const MOTIONS: usize = 6;
 
@@ -162,7 +165,10 @@ impl<'p> FreePart<'p> {
     /// The combinations of the columns of `allowed` against which nothing acts; `None` where there are none.
     fn unresisted(&self, allowed: DMatrix<f64>) -> Option<DMatrix<f64>> {
         let combined = combine(&self.fields(), &allowed);
-        let SVD { singular_values, v_t, .. } = self.resisted(&combined, &allowed).svd(false, true);
+        let resisted = self.resisted(&combined, &allowed);
+        // Numbers without a square have no decomposition.
+        let decomposed = SVD::try_new(resisted, false, true, f64::EPSILON, MOST_SWEEPS);
+        let SVD { singular_values, v_t, .. } = decomposed?;
         let v = v_t?.transpose();
         let is_free = |k: &usize| singular_values[*k] <= NO_FORCE;
         let free: Vec<_> = (0..singular_values.len()).filter(is_free).map(|k| v.column(k).into_owned()).collect();
