@@ -18,7 +18,7 @@ pub struct SpinningPart {
     pub axis: Vec3,
     /// GJ/L, a moment per radian
     pub torsion: f64,
-    /// EA L, a moment per radian
+    /// EA L, which has the unit of a moment per radian: the size of what resists stretching and shear
     pub stretching: f64,
 }
 
@@ -32,7 +32,7 @@ const HOLD_RATIO: f64 = 1e-3;
 const HOLD_RATIO_IN_MODES: f64 = 1e-8;
 
 /// The least stiffness of the hold, over EA L: where GJ is tiny, the spin would be lost in the round-off
-/// of what resists stretching and shear.
+/// of what resists stretching and shear. Modes of straight parts do not contain the spin, whatever holds it.
 const LEAST_HOLD_RATIO: f64 = 1e-14;
 
 /// The stages in which spins are held.

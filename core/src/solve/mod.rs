@@ -28,7 +28,7 @@ pub use convergence::{Convergence, Judgement, Residual, Verdict, size};
 pub use general::GeneralSolver;
 pub use krylov::{Operator, Spectrum, largest_eigenvalues, leading_eigenvalues_until};
 pub use linear::{Factorisation, LinearSolver};
-pub use modes::{MIN_GROWTH_RATIO, Matrices, ModeSearch, ModeShape, SmallMotion};
+pub use modes::{MIN_GROWTH_RATIO, Matrices, ModeSearch, ModeShape, Nearest, SmallMotion};
 pub use newton::{Newton, NewtonMemory, contraction};
 pub use newton_failure::NewtonFailure;
 pub use pivots::is_symmetric;

@@ -84,6 +84,15 @@ pub struct SmallMotion {
     pub(crate) shape: Option<ModeShape>,
 }
 
+/// The small motions nearest to a shift.
+#[derive(Default)]
+pub struct Nearest {
+    /// Those that are verified, nearest first
+    pub(crate) motions: Vec<SmallMotion>,
+    /// Exponents of those that failed verification, without what is round-off
+    pub(crate) failed: Vec<Complex<f64>>,
+}
+
 /// Small motions near a shift, as far as they tell stability.
 pub struct GrowthNearby {
     /// Exponents of the motions, without verification; of multiple ones at least one
@@ -157,8 +166,6 @@ pub struct ModeSearch<'a> {
     is_ready: bool,
     /// Number of negative pivots of K + shift^2 M, for symmetric K
     negative: Option<usize>,
-    /// Exponents of motions that the last search has found, but that failed verification
-    pub(crate) dropped: Vec<Complex<f64>>,
     /// Number of factorisations so far
     pub(crate) factorisations: u64,
 }
@@ -238,7 +245,6 @@ impl<'a> ModeSearch<'a> {
             shift: 0.0,
             is_ready: false,
             negative: None,
-            dropped: Vec::new(),
             factorisations: 0,
         };
         let has_mass = |motion: &Vec<f64>| {
@@ -470,9 +476,8 @@ impl<'a> ModeSearch<'a> {
         if takes_energies { Vec::new() } else { self.diagonal() }
     }
 
-    /// The motions nearest to the shift factorised last, nearest first, without those that fail
-    /// verification. `None` if a solution fails, or after a request to stop.
-    pub fn nearest(&mut self, wanted: usize) -> Option<Vec<SmallMotion>> {
+    /// The motions nearest to the shift factorised last, nearest first. `None` if a solution fails, or after a request to stop.
+    pub fn nearest(&mut self, wanted: usize) -> Option<Nearest> {
         let room = self.room(wanted);
         let diagonal = self.inner_product();
         let mut operator = ModeOperator { search: self, diagonal };
@@ -511,8 +516,8 @@ impl<'a> ModeSearch<'a> {
         let failed = failed.into_iter().map(|number| spectrum.values[number]);
         let failed = failed.filter(|theta| theta.norm() > NEGLIGIBLE_PART * largest);
         let exponents = failed.map(|theta| self.form.exponent(self.shift, theta));
-        self.dropped = exponents.filter(|exponent| exponent.norm() > FREE_MOTION_RATIO * self.shift).collect();
-        Some(motions)
+        let failed = exponents.filter(|exponent| exponent.norm() > FREE_MOTION_RATIO * self.shift).collect();
+        Some(Nearest { motions, failed })
     }
 
     /// Motions near the shift factorised last, as far as they tell stability. The search ends as

@@ -93,9 +93,10 @@ pub fn rigid_motions(assembly: &Assembly, model: &Model, state: &State, places: 
     // A soft spring is round-off beside stiff beams, but not beside all else, which is looked at first.
     let others = all_but_beams(assembly, model, state);
     let motions = loose.into_iter().filter_map(|(part, allowed)| {
-        let free = FreePart { system: &others.system, ..part }.unresisted(allowed)?;
-        let free = part.unresisted(free)?;
-        Some(combine(&part.fields(), &free))
+        let fields = part.fields();
+        let free = FreePart { system: &others.system, ..part }.unresisted(&fields, allowed)?;
+        let free = part.unresisted(&fields, free)?;
+        Some(combine(&fields, &free))
     });
     motions.flatten().collect()
 }
@@ -162,10 +163,10 @@ impl<'p> FreePart<'p> {
         Self { nodes, system, whole: system, state, centre, extent }
     }
 
-    /// The combinations of the columns of `allowed` against which nothing acts; `None` where there are none.
-    fn unresisted(&self, allowed: DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let combined = combine(&self.fields(), &allowed);
-        let resisted = self.resisted(&combined, &allowed);
+    /// The combinations of the columns of `allowed` against which nothing acts; `None` where there are none. `fields`: see
+    /// [`Self::fields`].
+    fn unresisted(&self, fields: &[Vec<f64>], allowed: DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let resisted = self.resisted(fields, &allowed);
         // Numbers without a square have no decomposition.
         let decomposed = SVD::try_new(resisted, false, true, f64::EPSILON, MOST_SWEEPS);
         let SVD { singular_values, v_t, .. } = decomposed?;
@@ -227,19 +228,18 @@ impl<'p> FreePart<'p> {
         out
     }
 
-    /// The forces against motions, which are combined with the columns of `allowed`, each over its terms: the triangle R
+    /// The forces against the combinations of `fields` with the columns of `allowed`, each over its terms: the triangle R
     /// of their factorisation Q R.
-    fn resisted(&self, motions: &[Vec<f64>], allowed: &DMatrix<f64>) -> DMatrix<f64> {
+    fn resisted(&self, fields: &[Vec<f64>], allowed: &DMatrix<f64>) -> DMatrix<f64> {
         let system = self.system;
         let count = system.pattern.dof_map.count();
         let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
         let all_sizes: Vec<f64> = self.whole.values.iter().map(|v| v.abs()).collect();
-        let fields = self.fields();
         let usual: Vec<f64> =
             (0..count).map(|k| fields.iter().map(|field| field[k].abs()).fold(0.0, f64::max)).collect();
         let mut scale = vec![0.0_f64; count];
         let mut forces: Vec<Vec<f64>> = Vec::new();
-        for (k, motion) in motions.iter().enumerate() {
+        for (k, motion) in combine(fields, allowed).iter().enumerate() {
             let mut force = system.multiply(&system.values, motion);
             let turn = Vec3([3, 4, 5].map(|number| allowed[(number, k)] / self.extent));
             let expected = self.turned_forces(motion, turn);
@@ -255,14 +255,16 @@ impl<'p> FreePart<'p> {
                 .for_each(|((scale, (term, all)), e)| *scale = scale.max(term + e.abs()).max(LEAST_OF_ALL * all));
             forces.push(force);
         }
-        let part = |row: usize, k: usize| if scale[row] > 0.0 { forces[k][row] / scale[row] } else { 0.0 };
+        // Rows without terms are none; there are at least as many rows as columns.
+        let mut rows: Vec<usize> = (0..count).filter(|&row| scale[row] > 0.0).collect();
+        let (terms, columns) = (rows.len(), forces.len());
+        rows.resize(terms.max(columns), 0);
+        let over_terms = |k: usize, column: usize| {
+            let row = rows[k];
+            if k < terms { forces[column][row] / scale[row] } else { 0.0 }
+        };
         // Squares would lose half of the digits: the triangle of a factorisation does not.
-        let all = DMatrix::from_fn(
-            count.max(forces.len()),
-            forces.len(),
-            |row, k| if row < count { part(row, k) } else { 0.0 },
-        );
-        all.qr().r()
+        DMatrix::from_fn(rows.len(), columns, over_terms).qr().r()
     }
 
     /// The change of the forces on the part where they turn with it, one number an equation.

@@ -3,7 +3,7 @@
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model};
 use crate::run::failure::Failure;
-use crate::solve::{MIN_GROWTH_RATIO, Matrices, ModeSearch, SmallMotion, Work, timed};
+use crate::solve::{MIN_GROWTH_RATIO, Matrices, ModeSearch, Nearest, SmallMotion, Work, timed};
 use crate::sorting::sort_numbers;
 use crate::system::{State, System};
 use nalgebra::Complex;
@@ -30,16 +30,19 @@ const SAME: f64 = 1e-6;
 /// Motions slower than this part of the others tell nothing of their frequencies.
 const FREE: f64 = 1e-4;
 
-/// The part of |s| from which on a motion that failed verification may grow.
-const SURELY_GROWS: f64 = 1e-3;
+/// Growth from which on a motion that failed verification counts as growing, over |s|: smaller growth is its error.
+const MAY_GROW: f64 = 1e-3;
 
-/// Motions are searched from a shift of their own if that is so many times higher.
+/// Motions that failed verification are searched from a shift of their own if that is so many times higher: next to the
+/// first shift they would fail again.
 const FAR_ABOVE: f64 = 10.0;
 
 /// The modes of a stage, and what is known about them.
 #[derive(Default)]
 pub struct Found {
     pub(super) motions: Vec<SmallMotion>,
+    /// Exponents of motions that failed verification
+    failed: Vec<Complex<f64>>,
     /// Rigid motions of free parts
     pub(super) rigid: usize,
     /// Unstable modes that are known to be there and were not found
@@ -51,6 +54,20 @@ pub struct Found {
 impl Found {
     pub fn growing(&self) -> usize {
         self.motions.iter().filter(|motion| grows(motion)).count()
+    }
+
+    fn take(&mut self, nearest: Nearest) {
+        (self.motions, self.failed) = (nearest.motions, nearest.failed);
+    }
+
+    /// True if motions that failed verification may be among those that are asked for, or grow.
+    fn lacks_failed(&self, modes: usize) -> bool {
+        let mut sizes: Vec<f64> = self.motions.iter().map(|motion| motion.exponent.norm()).collect();
+        sizes.extend(std::iter::repeat_n(0.0, self.rigid));
+        sort_numbers(&mut sizes);
+        let last = modes.checked_sub(1).map_or(0.0, |last| sizes.get(last).copied().unwrap_or(f64::INFINITY));
+        let is_asked_for = |exponent: &Complex<f64>| exponent.norm() < last || exponent.re > MAY_GROW * exponent.norm();
+        self.failed.iter().any(is_asked_for)
     }
 }
 
@@ -127,9 +144,9 @@ fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> 
     }
     let Some(unstable) = search.growing() else {
         let is_held = search.is_held();
-        found.motions = search.nearest(modes + SPARE)?;
+        found.take(search.nearest(modes + SPARE)?);
+        found.is_short = found.lacks_failed(modes);
         let exponents: Vec<Complex<f64>> = found.motions.iter().map(|motion| motion.exponent).collect();
-        found.is_short = dropped_among(search, &found, modes);
         for further in unseen(search, &exponents, shift).filter(|_| !is_held) {
             add_new(&mut found.motions, growing_from(search, further, SPARE));
         }
@@ -137,11 +154,9 @@ fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> 
     };
     let mut wanted = modes + unstable + 2;
     for _ in 0..MOST_SEARCHES {
-        found.motions = look_in_parts(search, shift, wanted)?;
+        found.take(look_in_parts(search, shift, wanted)?);
         if found.growing() < unstable {
-            let dropped = search.dropped.clone();
             find_growing(search, shift, &mut found, unstable);
-            search.dropped = dropped;
         }
         found.missing = unstable.saturating_sub(found.growing());
         found.is_short = found.missing == 0 && !is_complete(search, &found, modes);
@@ -195,29 +210,29 @@ fn unseen(search: &ModeSearch, exponents: &[Complex<f64>], shift: f64) -> std::v
 }
 
 /// The motions nearest to a shift; `None` where a solution fails.
-fn look(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Vec<SmallMotion>> {
+fn look(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Nearest> {
     if search.factorise(shift) { search.nearest(wanted) } else { None }
 }
 
 /// The motions nearest to a shift. Where far slower ones take the digits of others, these are searched from a shift of
 /// their own. `None` where a solution fails.
-fn look_in_parts(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Vec<SmallMotion>> {
-    let mut motions = look(search, shift, wanted)?;
-    let slowest = search.dropped.iter().map(|exponent| exponent.norm()).fold(f64::INFINITY, f64::min);
+fn look_in_parts(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Nearest> {
+    let mut all = look(search, shift, wanted)?;
+    let slowest = all.failed.iter().map(|exponent| exponent.norm()).fold(f64::INFINITY, f64::min);
     if !slowest.is_finite() || SHIFT * slowest < FAR_ABOVE * shift {
-        return Some(motions);
+        return Some(all);
     }
-    let is_slow = |motion: &SmallMotion| motion.exponent.norm() < 0.5 * slowest;
+    let is_slow = |exponent: &Complex<f64>| exponent.norm() < 0.5 * slowest;
     let others = look(search, SHIFT * slowest, wanted)?;
-    search.dropped.retain(|exponent| exponent.norm() >= 0.5 * slowest);
-    motions.retain(|motion| is_slow(motion) || grows(motion));
-    motions.extend(others.into_iter().filter(|motion| !is_slow(motion) && !grows(motion)));
-    Some(motions)
+    all.motions.retain(|motion| is_slow(&motion.exponent) || grows(motion));
+    all.motions.extend(others.motions.into_iter().filter(|motion| !is_slow(&motion.exponent) && !grows(motion)));
+    all.failed = others.failed.into_iter().filter(|exponent| !is_slow(exponent)).collect();
+    Some(all)
 }
 
 /// The motions nearest to a shift that grow; none where the shift hits a motion.
 fn growing_from(search: &mut ModeSearch, shift: f64, wanted: usize) -> Vec<SmallMotion> {
-    look(search, shift, wanted).unwrap_or_default().into_iter().filter(grows).collect()
+    look(search, shift, wanted).unwrap_or_default().motions.into_iter().filter(grows).collect()
 }
 
 /// From above: at a shift behind which nothing grows any faster. All of them are there then, or
@@ -250,20 +265,10 @@ fn is_complete(search: &mut ModeSearch, found: &Found, modes: usize) -> bool {
     // The widest gap behind the last mode that is asked for.
     let gaps = (first..omegas.len()).map(|k| (omegas[k] - omegas[k - 1], k));
     let Some((gap, behind)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0)) else {
-        return !dropped_among(search, found, modes);
+        return !found.lacks_failed(modes);
     };
     let at = omegas[behind] - 0.5 * gap;
     gap <= SAME * at || search.slower(at).is_none_or(|count| count == found.rigid + found.growing() + behind)
-}
-
-/// True if motions that failed verification in the last search may be among those that are asked for, or grow.
-fn dropped_among(search: &ModeSearch, found: &Found, modes: usize) -> bool {
-    let mut sizes: Vec<f64> = found.motions.iter().map(|motion| motion.exponent.norm()).collect();
-    sizes.extend(std::iter::repeat_n(0.0, found.rigid));
-    sort_numbers(&mut sizes);
-    let last = modes.checked_sub(1).map_or(0.0, |last| sizes.get(last).copied().unwrap_or(f64::INFINITY));
-    let is_listed = |exponent: &Complex<f64>| exponent.norm() < last || exponent.re > SURELY_GROWS * exponent.norm();
-    search.dropped.iter().any(is_listed)
 }
 
 /// The slowest motion that something holds.
