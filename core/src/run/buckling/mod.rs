@@ -199,19 +199,8 @@ impl Buckling<'_, '_> {
             if let Some(found) = search.found() {
                 let ended = search.ended.is_some();
                 let goes_on = ended && self.goes_on(&search, found, none.map(|none| none + before))?;
-                if goes_on {
-                    let behind = self.stage.state.clone();
-                    let off = self.foreseen(&search, found, before)?;
-                    if off > FORESEEN {
-                        if off < ASIDE {
-                            self.warn_of_turn_aside(found);
-                        }
-                        // A step from further away came down elsewhere, or nowhere.
-                        self.stage.go_back_to(&behind)?;
-                        let ahead = next_critical_load(self.stage, search.way, before)?;
-                        search.go_on_from(self.stage.state, ahead);
-                        continue;
-                    }
+                if goes_on && self.passes_by(&mut search, found, before)? {
+                    continue;
                 }
                 let is_apart = |behind: &State| distance(self.stage.model, &search.here, behind) > APART;
                 if search.is_a_limit(found) && !search.behind.as_ref().is_some_and(is_apart) {
@@ -248,6 +237,23 @@ impl Buckling<'_, '_> {
         }
         self.warn_of_estimate(search.here.load, search.ended);
         Ok(Found::on_the_way(search.estimate, CriticalKind::Estimate))
+    }
+
+    /// True if the load is no critical one: the tangent next to it does not foresee it, and the search goes on from the
+    /// present state, behind it. A step from further away came down elsewhere, or nowhere.
+    fn passes_by(&mut self, search: &mut CriticalSearch, load: f64, before: usize) -> Result<bool, Failure> {
+        let behind = self.stage.state.clone();
+        let off = self.foreseen(search, load, before)?;
+        if off <= FORESEEN {
+            return Ok(false);
+        }
+        if off < ASIDE {
+            self.warn_of_turn_aside(load);
+        }
+        self.stage.go_back_to(&behind)?;
+        let ahead = next_critical_load(self.stage, search.way, before)?;
+        search.go_on_from(self.stage.state, ahead);
+        Ok(true)
     }
 
     /// How far from a load, relative to it, the tangent of the last point before it looks singular.
