@@ -241,8 +241,8 @@ impl History for Table {
     }
 }
 
-/// Where in its interval a smooth step bends most, nearly: neither the ends nor the middle of the interval show anything
-/// of its accelerations, which are zero there.
+/// Where in its interval a smooth step has 97 % of its largest acceleration. At the ends and in the middle of the interval
+/// the acceleration is zero, so that a time step over all of it would see none.
 const BENDS: [f64; 2] = [0.25, 0.75];
 
 /// The smallest noticeable jump of a velocity, over the largest velocity: smaller ones are those of

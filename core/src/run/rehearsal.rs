@@ -310,32 +310,31 @@ impl<'p> Rehearser<'p> {
 
     /// Loads, and velocities of motions and motors, that change between the ends of fixed steps.
     fn look_between_steps(&mut self, number: usize, steps: &TimeStepping) {
-        let (time, jumps) = (self.state.time, &mut self.found.jumps);
+        let time = self.state.time;
         if steps.adaptive.is_some() || steps.end <= time {
             return;
         }
-        let mut look = |timeline: Timeline, derivative: usize, what: Driven| {
-            // Loads act from the start of the stage on; velocities are all of the way. Kinks are told anyway.
-            let is_velocity = derivative > 0;
-            if is_velocity && timeline.next_kink(time).is_some() {
-                return;
-            }
+        let missed = |timeline: &Timeline, derivative: usize, first: f64| {
             let value = |time| timeline.at(time, 1.0)[derivative];
-            let first = if is_velocity { 0.0 } else { value(time) };
-            let missed = missed_part(value, |time| timeline.next_corner(time), first, [time, steps.end], steps.step);
-            let how = missed.map(|part| JumpKind::BetweenSteps { part });
-            jumps.extend(how.map(|how| HistoryJump { stage: number, what, how }));
+            missed_part(value, |time| timeline.next_corner(time), first, [time, steps.end], steps.step)
+        };
+        let of_load = |timeline: Timeline| missed(&timeline, 0, timeline.at(time, 1.0)[0]);
+        // The way is the impulse of the velocity. Kinks are told anyway.
+        let of_motion = |timeline: Timeline| match timeline.next_kink(time) {
+            None => missed(&timeline, 1, 0.0),
+            Some(_) => None,
         };
         let mut of_motors = vec![None; self.model.amplitudes.len()];
         self.model.each_motor(&self.state, &mut |motor| of_motors[motor.amplitude] = Some(motor.slot));
-        for (k, timeline) in self.schedule.loads(self.model).enumerate() {
-            match of_motors[k] {
-                None => look(timeline, 0, Driven::Amplitude(k)),
-                Some(slot) => look(timeline, 1, Driven::Motor(slot)),
-            }
-        }
-        for (k, (_, timeline)) in self.schedule.motions(self.model).enumerate() {
-            look(timeline, 1, Driven::Motion(k));
+        let loads = self.schedule.loads(self.model).enumerate().map(|(k, timeline)| match of_motors[k] {
+            None => (Driven::Amplitude(k), of_load(timeline)),
+            Some(slot) => (Driven::Motor(slot), of_motion(timeline)),
+        });
+        let motions = self.schedule.motions(self.model).enumerate();
+        let motions = motions.map(|(k, (_, timeline))| (Driven::Motion(k), of_motion(timeline)));
+        for (what, part) in loads.chain(motions) {
+            let how = part.map(|part| JumpKind::BetweenSteps { part });
+            self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what, how }));
         }
     }
 

@@ -192,11 +192,10 @@ impl StageRun<'_> {
 
     /// Books the work of the step that ends here, and that of the impulses in it.
     fn book_step(&mut self) {
-        let end = Entry::new(self.model, self.state, &self.assembly);
+        self.bookkeeper.add_step(Entry::new(self.model, self.state, &self.assembly));
         if let Some(without_jumps) = self.schedule.without_jumps(self.model, self.state, self.good.time) {
-            self.bookkeeper.add_impulse(Entry::new(self.model, &without_jumps, &self.assembly), end);
+            self.bookkeeper.add_impulse(Entry::new(self.model, &without_jumps, &self.assembly));
         }
-        self.bookkeeper.add_step(end);
     }
 
     /// Continues from the last good state what goes on without jumps: turns of nodes and of joints.

@@ -113,10 +113,11 @@ impl Bookkeeper {
         }
     }
 
-    /// Adds the work of the impulses by which prescribed velocities jump, from a state without these jumps to one with
-    /// them.
-    pub fn add_impulse(&mut self, from: Entry, to: Entry) {
-        self.ledger.external += to.energy().kinetic - from.energy().kinetic;
+    /// Adds the work of the impulses by which prescribed velocities have jumped in the step that was added last, whose
+    /// end without these jumps is given.
+    pub fn add_impulse(&mut self, without_jumps: Entry) {
+        self.ledger.external += self.ledger.kinetic - without_jumps.energy().kinetic;
+        self.scale = self.scale.max(self.ledger.external.abs());
     }
 
     /// A stage begins whose work is not booked: the account begins anew behind it.
