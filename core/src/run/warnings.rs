@@ -23,7 +23,8 @@ const LOOSE_BALANCE: f64 = 1e-5;
 /// A motion below this, in lengths of the scene and radians, is round-off.
 const MOVED: f64 = 1e-12;
 
-/// The part of the strain energy from which on the energy of elastic stick is told.
+/// The part of the strain energy from which on the energy of elastic stick is told: leaves of a spring that are ten times
+/// too soft have 0.1, and four scenes of `decks/contact` 0.0002 to 0.025.
 const MOST_HELD_BY_STICK: f64 = 0.05;
 /// The part of the energy of elastic stick below which strain energy is none: bodies on slopes strain nothing.
 const LEAST_STRAIN: f64 = 0.05;
@@ -137,8 +138,8 @@ impl StageRun<'_> {
         self.warn(WarningKind::SoftStick, message);
     }
 
-    /// Parts that friction holds together are stiff only as far as its springs are.
-    pub fn warn_of_stick_that_gives(&mut self) {
+    /// Parts that friction holds together in a static stage are stiff only as far as its springs are.
+    pub fn warn_of_soft_stick_at_rest(&mut self) {
         let Some(contacts) = self.model.contacts() else { return };
         let [held, strain] = [contacts.energy(self.state), self.model.energy(self.state).strain];
         let is_soft = held > MOST_HELD_BY_STICK * strain && strain > LEAST_STRAIN * held;
