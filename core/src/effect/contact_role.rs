@@ -43,6 +43,10 @@ pub trait Contacts {
     /// Changes of contacts since the accepted state `before`.
     fn change(&self, before: &State, at: &State) -> ContactChange;
 
+    /// True if most of the friction of a contact in a balanced state is at points that were apart in the
+    /// accepted state `before`: they moved on without a contact, which counts as sliding.
+    fn touches_late(&self, before: &State, at: &State) -> bool;
+
     /// The deepest penetration of the contacts that act in a state, if it is larger than allowed.
     /// `begins` tells of which ones, by the number of the amplitude that switches them.
     fn penetrates(&self, at: &State, begins: &dyn Fn(usize) -> bool) -> Option<Penetration>;

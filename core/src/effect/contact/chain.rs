@@ -33,6 +33,9 @@ const ROUNDED_PLACE: f64 = 1e-9;
 /// not beyond it, if the cosine between its direction and the beam is below this.
 pub(super) const CAP_COSINE: f64 = 0.5;
 
+/// The shortest step along an element that is looked at, over the radius of the beam.
+const SHORTEST_LOOK: f64 = 0.1;
+
 /// A beam or a body against one surface.
 #[derive(Clone, Debug)]
 pub struct Chain {
@@ -131,6 +134,22 @@ impl Chain {
             (-gap > allowed).then_some(-gap)
         };
         self.seen(carrier, at).into_iter().enumerate().find_map(|(node, place)| Some((node, depth(place)?)))
+    }
+
+    /// The first node of an element that crosses a box or a mesh, and its penetration: its centre line is
+    /// inside between nodes that are outside. No edge pushes it out, since that needs a centre line
+    /// outside of its faces.
+    pub(super) fn crossing(&self, surface: &Surface, carrier: &Carrier, at: &State) -> Option<(usize, f64)> {
+        if self.order == 0 || !surface.has_edges() {
+            return None;
+        }
+        let places = self.seen(carrier, at);
+        let regime = at.contacts.regime;
+        let mut seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points: &[], regime };
+        (0..self.elements()).find_map(|k| {
+            let height = if seen.is_free(k) { 0.0 } else { seen.least_height_between_nodes(k) };
+            (height < 0.0).then_some((k * self.order, self.radius - height))
+        })
     }
 
     /// Places of the nodes in the coordinates of a surface.
@@ -258,6 +277,25 @@ impl SeenChain<'_> {
         let is_free = factor * farthest(middle) < gap;
         self.free = (middle, gap);
         is_free
+    }
+
+    /// The least distance of the centre line of element `k` from the surface between nodes that are
+    /// outside; zero where one is not. Steps along it are as long as the distance, which cannot become
+    /// zero in a shorter one.
+    fn least_height_between_nodes(&self, k: usize) -> f64 {
+        let places = self.places_of(k);
+        let height = |place: Vec3| self.surface.value(place, self.chain.radius).unwrap_or(f64::INFINITY);
+        if places.iter().any(|place| height(*place) < 0.0) {
+            return 0.0;
+        }
+        let length = REACH[places.len()] * places.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum::<f64>();
+        let (mut least, mut s) = (0.0f64, 0.0);
+        while s < 1.0 {
+            let here = height(self.place(k, s));
+            least = least.min(here);
+            s += here.max(SHORTEST_LOOK * self.chain.radius) / length;
+        }
+        least
     }
 
     fn minima(&self, k: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> Minima {

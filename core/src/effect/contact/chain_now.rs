@@ -184,6 +184,12 @@ impl<'a> ChainNow<'a> {
         heights[1] < heights[0].min(heights[2])
     }
 
+    /// The gap of a candidate in another state; infinite where the surface has no normal.
+    pub(super) fn gap_in(&self, candidate: &Candidate, at: &State) -> f64 {
+        let seen = self.surface.carrier(at, Weights::NONE).on_surface(self.place_in(candidate, at));
+        candidate.distance(&self.surface.surface, seen).map_or(f64::INFINITY, |it| it.value) - self.chain.radius
+    }
+
     /// The place of a candidate (global components).
     fn place(&self, candidate: &Candidate) -> Vec3 {
         self.place_in(candidate, self.at)
@@ -203,8 +209,7 @@ impl<'a> ChainNow<'a> {
 
     /// The factor on the stiffness of stick that a point needs.
     pub(super) fn needed_stick_factor(&self, point: &PointNow) -> f64 {
-        let Some(law) = &point.law.friction else { return 0.0 };
-        let limit = law.coefficient * point.state.normal_force.force;
+        let limit = point.friction_limit();
         let element = point.candidate.element;
         let length = self.chain.element_length(element);
         self.laws.needed_stick_factor(limit, &self.chain.stiffness[element], length, self.chain.radius)
@@ -225,5 +230,15 @@ impl PointNow<'_> {
     /// The work of friction since the last converged state.
     pub(super) fn friction_work(&self) -> f64 {
         self.candidate.weight * self.state.traction.work(&self.law.carried, self.state.normal)
+    }
+
+    /// The amount of friction, without the weight.
+    pub(super) fn friction(&self) -> f64 {
+        self.state.traction.force.norm()
+    }
+
+    /// The limit of friction, without the weight.
+    pub(super) fn friction_limit(&self) -> f64 {
+        self.law.friction.as_ref().map_or(0.0, |law| law.coefficient * self.state.normal_force.force)
     }
 }

@@ -6,6 +6,7 @@
 
 mod chain;
 mod chain_now;
+mod late_touch;
 mod laws;
 mod pairs;
 mod passing;
@@ -34,6 +35,7 @@ use crate::system::{
 };
 use crate::tensor::Vec3;
 use chain_now::{ChainNow, before_of};
+use late_touch::LateTouch;
 use laws::{RELEVANT_FORCE, ROUNDED};
 use pairs::PairRole;
 use std::sync::Arc;
@@ -522,6 +524,30 @@ impl Contacts for SurfaceContacts {
         }
     }
 
+    fn touches_late(&self, before: &State, at: &State) -> bool {
+        let mut late = LateTouch::new(self.laws.len());
+        self.each_chain(at, Weights::NONE, &mut |number, chain| {
+            if !chain.laws.rubs() {
+                return;
+            }
+            let mut active = Vec::new();
+            let mut forces = Vec::new();
+            chain.each_point(Weights::NONE, &mut |point, _| {
+                if point.state.normal_force.force > 0.0 {
+                    active.push(*point.candidate);
+                    forces.push([point.friction(), point.friction_limit()].map(|force| point.candidate.weight * force));
+                }
+            });
+            let predecessors = chain.chain.predecessors(&active, before.contacts.chains.get(number));
+            for ((candidate, predecessors), [friction, limit]) in active.iter().zip(&predecessors).zip(forces) {
+                let was_apart = || predecessors.is_none() && chain.gap_in(candidate, before) > chain.laws.penetration;
+                late.add(chain.chain.contact, friction, limit, was_apart);
+            }
+        });
+        self.pairs().add_late(before, at, &mut late);
+        late.is_decisive()
+    }
+
     fn penetrates(&self, at: &State, begins: &dyn Fn(usize) -> bool) -> Option<Penetration> {
         let mut deepest: Option<Penetration> = None;
         self.each_chain(at, Weights::NONE, &mut |_, chain| {
@@ -543,7 +569,8 @@ impl Contacts for SurfaceContacts {
         });
         for (chain, laws, surface) in self.acting(at).filter(|(_, laws, _)| begins(laws.amplitude)) {
             let carrier = surface.carrier(at, Weights::NONE);
-            let Some((node, depth)) = chain.lost_node(&surface.surface, &carrier, at, laws.penetration) else {
+            let lost = chain.lost_node(&surface.surface, &carrier, at, laws.penetration);
+            let Some((node, depth)) = lost.or_else(|| chain.crossing(&surface.surface, &carrier, at)) else {
                 continue;
             };
             if deepest.as_ref().is_none_or(|deepest| depth > deepest.depth) {
@@ -596,7 +623,9 @@ impl Contacts for SurfaceContacts {
 
     fn passed(&self, from: &State, to: &State) -> Option<Slot> {
         let of_chain = |(chain, _, surface): (&Chain, &ContactLaws, &SceneSurface)| {
-            passing::passed(chain, surface, from, to).map(|node| chain.nodes[node].node.u)
+            let crossing = || chain.crossing(&surface.surface, &surface.carrier(to, Weights::NONE), to);
+            let passed = passing::passed(chain, surface, from, to).or_else(|| Some(crossing()?.0));
+            passed.map(|node| chain.nodes[node].node.u)
         };
         let of_surfaces = self.acting(to).find_map(of_chain).or_else(|| self.strayed(from, to));
         of_surfaces.or_else(|| self.pairs().turned_over(to)).or_else(|| self.pairs().passed(from, to))

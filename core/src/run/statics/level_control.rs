@@ -21,6 +21,10 @@ use crate::warning::WarningKind;
 const IN_MOTION: &str = "(the stage started from a moving state, whose inertia forces are ramped down: `[damping]` in the previous dynamic \
      stage makes them smaller)";
 
+/// The part of a level up to which a step may be long in which a point with friction comes into
+/// contact: so much of a level may count as sliding that was none.
+const LONGEST_STEP_OF_TOUCH: f64 = 1.0 / 32.0;
+
 /// The outcome of a step.
 enum StepOutcome {
     /// Balance, with these signs of pivots
@@ -31,6 +35,8 @@ enum StepOutcome {
     Strayed(Option<Signature>),
     /// Balance, with more friction than energy: perhaps on another branch
     Overdrawn(Option<Signature>),
+    /// Balance, with friction of points that have touched on the way: it counts their way before that
+    TouchedLate(Option<Signature>),
     /// No balance
     Failed(NewtonFailure),
 }
@@ -83,7 +89,7 @@ impl LoadLevels<'_, '_> {
         let at_start = stability.signature;
         self.stage.good.copy_from(self.stage.state);
         let friction_account = FrictionAccount::open(self.stage);
-        LevelControl { stage: self.stage, space, levels, stability, friction_account, at_start, loose }
+        LevelControl { stage: self.stage, space, levels, stability, friction_account, at_start, loose, touch: None }
             .go(0, self.steps)
     }
 
@@ -98,8 +104,17 @@ impl LoadLevels<'_, '_> {
         }
         let friction_account = FrictionAccount::open(self.stage);
         let space = SpatialLook::default();
-        LevelControl { stage: self.stage, space, levels, stability, friction_account, at_start, loose: None }
-            .go(reached, self.steps)
+        LevelControl {
+            stage: self.stage,
+            space,
+            levels,
+            stability,
+            friction_account,
+            at_start,
+            loose: None,
+            touch: None,
+        }
+        .go(reached, self.steps)
     }
 }
 
@@ -114,6 +129,8 @@ struct LevelControl<'s, 'r> {
     at_start: Option<Signature>,
     /// The mechanism that nothing holds before the first level
     loose: Option<Failure>,
+    /// The load factor by which points with friction have touched that do not in the last good state
+    touch: Option<f64>,
 }
 
 impl LevelControl<'_, '_> {
@@ -170,15 +187,17 @@ impl LevelControl<'_, '_> {
             return self.rest_at(target, loose);
         }
         while self.stage.good.load < target {
-            let next = self.levels.next(self.stage.good.load, target);
+            let next = self.next(target);
             self.stage.tell_progress(next)?;
             match self.try_step(next) {
                 StepOutcome::Good(signature) => self.take_step(signature)?,
-                StepOutcome::Failed(NewtonFailure::Interrupted(signal)) => return Err(self.stage.stop(signal)),
-                _ if self.levels.halve(self.stage.soft) => {
-                    self.stage.counters.cutbacks += 1;
-                    self.stage.state.copy_all_but_rates(self.stage.good);
+                StepOutcome::TouchedLate(_) if self.may_halve_before_touch(next) => {
+                    self.touch = Some(next);
+                    self.go_back();
                 }
+                StepOutcome::TouchedLate(signature) => self.take_step(signature)?,
+                StepOutcome::Failed(NewtonFailure::Interrupted(signal)) => return Err(self.stage.stop(signal)),
+                _ if self.levels.halve(self.stage.soft) => self.go_back(),
                 StepOutcome::Overdrawn(signature) => {
                     self.warn_of_friction();
                     self.take_step(signature)?;
@@ -196,6 +215,29 @@ impl LevelControl<'_, '_> {
             }
         }
         Ok(Reached::Level)
+    }
+
+    /// The next load factor on the way to a level: half-way to one by which points have touched.
+    fn next(&mut self, target: f64) -> f64 {
+        let load = self.stage.good.load;
+        let planned = self.levels.next(load, target);
+        match self.touch {
+            Some(touch) if self.may_halve_before_touch(touch) => planned.min(0.5 * (load + touch)),
+            Some(touch) => planned.min(touch),
+            None => planned,
+        }
+    }
+
+    /// True if the way to a load factor by which points have touched may be taken in parts.
+    fn may_halve_before_touch(&self, touch: f64) -> bool {
+        let longest = LONGEST_STEP_OF_TOUCH * self.levels.level;
+        self.levels.approach != Approach::Straight && touch - self.stage.good.load > longest
+    }
+
+    /// Goes back to the last good state, for a shorter step.
+    fn go_back(&mut self) {
+        self.stage.counters.cutbacks += 1;
+        self.stage.state.copy_all_but_rates(self.stage.good);
     }
 
     /// A level is reached by a motion to a state of rest, where there is one that its loads hold;
@@ -252,6 +294,9 @@ impl LevelControl<'_, '_> {
         if self.friction_account.is_overdrawn(self.stage) {
             return StepOutcome::Overdrawn(signature);
         }
+        if self.touches_late() {
+            return StepOutcome::TouchedLate(signature);
+        }
         let StageRun { model, good, state, newton, soft, contact_change, .. } = &*self.stage;
         let changes = self.stability.changes_to(signature);
         match contact_change {
@@ -274,6 +319,13 @@ impl LevelControl<'_, '_> {
         }
     }
 
+    /// True if points with friction have come into contact on the way to a balanced state.
+    fn touches_late(&self) -> bool {
+        let StageRun { model, good, state, contact_change, .. } = &*self.stage;
+        let contacts = model.contacts().filter(|contacts| contacts.rubs() && *contact_change != ContactChange::None);
+        contacts.is_some_and(|contacts| contacts.touches_late(good, state))
+    }
+
     fn take_step(&mut self, signature: Option<Signature>) -> Result<(), Failure> {
         let lists = self.stage.counters.contacts.lists;
         self.stage.accept()?;
@@ -289,6 +341,7 @@ impl LevelControl<'_, '_> {
         if signature.is_some() && !is_assembled_anew && !self.stage.state.contacts.touches() {
             self.stage.newton.begin_with(&self.stage.assembly.system);
         }
+        self.touch = self.touch.filter(|&touch| touch > self.stage.good.load);
         self.levels.double();
         Ok(())
     }

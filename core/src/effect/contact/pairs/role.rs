@@ -2,6 +2,7 @@
 
 use super::BeamPairs;
 use super::point::{PairPoint, PairsNow, sort};
+use crate::effect::contact::late_touch::LateTouch;
 use crate::effect::contact::laws::{ContactLaws, RELEVANT_FORCE, ROUNDED};
 use crate::effect::contact::strand::ContactStiffness;
 use crate::effect::{ContactChange, ContactResultant, ContactSurvey, Penetration};
@@ -149,6 +150,24 @@ impl<'a> PairRole<'a> {
         } else {
             ContactChange::None
         }
+    }
+
+    /// Adds the friction of all points of a balanced state after the accepted state `before`.
+    pub fn add_late(self, before: &State, at: &State, out: &mut LateTouch) {
+        if !self.rubs() {
+            return;
+        }
+        let earlier = PairsNow::new(self.pairs, self.laws, before, &at.contacts.pairs.list);
+        self.each(at, &mut |point| {
+            let weight = point.candidate.weight;
+            let meeting = point.pair.meeting;
+            let was_apart = || {
+                !earlier.is_among(point, &before.contacts.pairs.points)
+                    && earlier.gap(&point.pair) > self.law_of(meeting).penetration
+            };
+            let contact = self.pairs.contact_of(meeting as usize);
+            out.add(contact, weight * point.traction().norm(), weight * point.friction_limit(), was_apart);
+        });
     }
 
     /// The deepest penetration among listed pairs that act, if it is larger than `allowed` times that of
