@@ -3,6 +3,7 @@
 use crate::random::Random;
 use crate::scenes::{list, results};
 use beamsim_core::run::{CriticalKind, CriticalLoad, StageResult};
+use beamsim_core::tensor::Vec3;
 use std::fs;
 use std::path::Path;
 
@@ -135,6 +136,79 @@ fn loads_after_an_early_end_are_scaled_as_a_whole() {
         for stages in [until(part), until(part) + rest, until(part) + rest + rest] {
             let load = first(&stages);
             assert!((load / whole - 1.0).abs() < 1e-6, "{part}: {load}, not {whole}\n{stages}");
+        }
+    }
+}
+
+/// A portal on clamped feet under two loads, in its plane, that is as good as inextensible: only their
+/// difference shortens its columns differently. In units of a length and of EI, with its plane across `normal`.
+fn portal(stiffness: f64, second: f64, start: f64, modes: usize, length: f64, normal: Vec3) -> String {
+    let along = normal.cross(Vec3([0.3, 0.4, 0.5])).normalized().unwrap();
+    let up = normal.cross(along);
+    let place = |x: f64, z: f64| list((along * x + up * z) * length);
+    let force = |part: f64| list(up * (-part / (length * length)));
+    let before = if start > 0.0 { "[[stage]]\nkind = \"static\"\nsteps = 1\n" } else { "" };
+    let load = if start > 0.0 { start } else { 1.0 };
+    let mut text = format!(
+        "[point]\nf0 = {}\nt0 = {}\nf1 = {}\nt1 = {}\n[section.s]\nEA = {ea:e}\nGA = {ea:e}\nGJ = 1\nEI = 1\n",
+        place(0.0, 0.0),
+        place(0.0, 1.0),
+        place(1.0, 0.0),
+        place(1.0, 1.0),
+        ea = stiffness / (length * length),
+    );
+    for (name, from, to) in [("c0", "f0", "t0"), ("c1", "f1", "t1"), ("g", "t0", "t1")] {
+        text += &format!(
+            "[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = [\"{from}\", \"{to}\"]\nelements = 4\norder = 3\n"
+        );
+    }
+    for foot in ["f0", "f1"] {
+        text += &format!("[[support]]\nat = \"{foot}\"\nfix = \"all\"\n");
+    }
+    for (top, part) in [("t0", 1.0), ("t1", second)] {
+        // Across its plane the portal is held.
+        let (x, y) = (list(along), list(normal));
+        text += &format!(
+            "[[support]]\nat = \"{top}\"\nfix = [\"uy\", \"rx\", \"rz\"]\naxes = [{x}, {y}]\n\
+             [[load]]\nat = \"{top}\"\nforce = {}\n",
+            force(load * part)
+        );
+    }
+    text + before + &format!("[[stage]]\nkind = \"buckling\"\nmodes = {modes}\n")
+}
+
+/// A portal with two loads that are not quite the same sways without a critical point at the load at which it would
+/// buckle, to a limit point far above. References: an eigenvalue problem of Hermite elements, without shortening.
+#[test]
+fn nearly_perfect_portals_buckle_where_perfect_ones_do() {
+    let mut random = Random::new(61);
+    for (stiffness, second, reference) in
+        [(1e5, 0.99, 7.4158), (1e5, 0.8, 8.1974), (1e6, 0.99, 7.4162), (1e6, 0.5, 9.8261), (1e6, 0.0, 14.586)]
+    {
+        for start in [0.0, 0.1, 0.3, 0.6] {
+            let length = 10f64.powf(random.range(-3.0, 3.0));
+            let load = start * reference;
+            let text = portal(stiffness, second, load, 1, length, random.direction());
+            let found = critical_loads(&text);
+            let load = found[0].load * if start > 0.0 { load } else { 1.0 };
+            let off = (load / reference - 1.0).abs();
+            assert!(off < 3e-3, "EA {stiffness:e}, {second}, from {start}: {load} for {reference}\n{found:?}\n{text}");
+        }
+    }
+}
+
+/// Its further loads are those of the perfect portal, too, and none is listed twice.
+#[test]
+fn nearly_perfect_portals_have_further_loads() {
+    let perfect = critical_loads(&portal(1e6, 1.0, 0.0, 3, 1.0, Vec3([0.0, 1.0, 0.0])));
+    for (length, start) in [(1.0, 0.0), (1e3, 1.0), (1e-3, 4.0)] {
+        let text = portal(1e6, 0.999, start, 3, length, Vec3([0.0, 0.6, 0.8]));
+        let found = critical_loads(&text);
+        assert_eq!(found.len(), 3, "{found:?}");
+        for (found, perfect) in found.iter().zip(&perfect) {
+            let load = found.load * if start > 0.0 { start } else { 1.0 };
+            // The mean of the loads is smaller by 5e-4.
+            assert!((load / perfect.load - 1.0).abs() < 2e-3, "{load} for {}: {found:?}", perfect.load);
         }
     }
 }

@@ -45,6 +45,16 @@ const APART: f64 = 1e-3;
 const STRIDE_AHEAD: f64 = 0.15;
 /// The part of a critical load by which the last extrapolation lies before it.
 const NEAREST_EXTRAPOLATION: f64 = 5e-3;
+/// Parts of the way to the first critical load from which the others are seen, to know whether they stay where they are.
+const PARTS_OF_SIGHTS: [f64; 2] = [0.3, 0.6];
+/// The part of a load to which its estimate from the start is right where the tangent varies evenly up to it: it is no
+/// limit point.
+const WELL_FORESEEN: f64 = 2e-3;
+/// How far a critical load as it looks may move, over the load from which it is seen, where it is that of a structure
+/// without a small imperfection.
+const STEADY: f64 = 1e-2;
+/// The same where a load far beyond it may be the right one, which is told.
+const NEARLY_STEADY: f64 = 5e-2;
 /// Looks of one extrapolation.
 const MOST_EXTRAPOLATIONS: usize = 48;
 
@@ -83,26 +93,44 @@ struct Response {
     work: Option<f64>,
 }
 
+/// True if a load is this near to another one, relative to it.
+fn is_near(a: f64, b: f64, part: f64) -> bool {
+    (a - b).abs() <= part * b.abs()
+}
+
+/// The critical loads above the present one so far, or those below it.
+#[derive(Clone, Copy, Default)]
+struct Direction {
+    limit: PathLimit,
+    /// The estimate of the last one from the start, if it was right
+    foreseen: Option<f64>,
+}
+
 /// The limit of a path above the present load, or below it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum PathLimit {
     /// The last critical load, if there is one, does not end the path by load control.
+    #[default]
     Open,
     /// The last critical load ends it, at this load.
     At(f64),
     /// The search for the next critical load has come to the same load: none lies before it.
     Reached,
+    /// A small imperfection turns the path aside at the last critical load: the next ones are those of a structure
+    /// without it.
+    Aside,
 }
 
 impl PathLimit {
     /// The limit after one more critical load.
     fn after(self, next: &Found) -> Self {
         let Found { critical: CriticalLoad { load, kind }, ends_path } = *next;
-        let is_same = |limit: f64| ends_path && (load - limit).abs() < SAME_LIMIT * limit.abs();
+        let is_same = |limit: f64| ends_path && is_near(load, limit, SAME_LIMIT);
         match self {
             Self::At(limit) if is_same(limit) => Self::Reached,
             _ if ends_path || kind == CriticalKind::Limit => Self::At(load),
-            Self::Open | Self::At(_) | Self::Reached => Self::Open,
+            _ if kind == CriticalKind::Estimate => Self::Aside,
+            Self::Open | Self::At(_) | Self::Reached | Self::Aside => Self::Open,
         }
     }
 }
@@ -132,13 +160,14 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         // pivots.
         let uncertainty = self.stage.counters.work.uncertainty;
         let mut found = Vec::new();
-        let mut directions = [PathLimit::Open; 2];
+        let mut directions = [Direction::default(); 2];
         for number in 0..loads.len() {
             let direction = &mut directions[usize::from(loads[number] < load)];
-            if *direction != PathLimit::Reached {
-                let next = self.find(&loads, number, &start)?;
-                *direction = direction.after(&next);
-                found.extend((*direction != PathLimit::Reached).then_some(next.critical));
+            if direction.limit != PathLimit::Reached {
+                let next = self.find(&loads, number, &start, direction)?;
+                direction.limit = direction.limit.after(&next);
+                direction.foreseen = is_near(loads[number], next.critical.load, WELL_FORESEEN).then_some(loads[number]);
+                found.extend((direction.limit != PathLimit::Reached).then_some(next.critical));
             }
         }
         self.stage.counters.work.uncertainty = uncertainty;
@@ -172,10 +201,18 @@ impl Buckling<'_, '_> {
 
     /// The critical load that looks from the start as number `number` of these. The state is then
     /// the start again.
-    fn find(&mut self, loads: &[f64], number: usize, start: &State) -> Result<Found, Failure> {
+    fn find(&mut self, loads: &[f64], number: usize, start: &State, others: &Direction) -> Result<Found, Failure> {
         let is_back = |load: f64| load < start.load;
+        let on_this_side = |load: &&f64| is_back(**load) == is_back(loads[number]);
         // Of the loads on this side of the present one it is number `before`.
-        let before = loads[..number].iter().filter(|&&load| is_back(load) == is_back(loads[number])).count();
+        let before = loads[..number].iter().filter(on_this_side).count();
+        let nearest = *loads.iter().find(on_this_side).unwrap_or(&loads[number]);
+        let estimate = Sight { from: start.load, critical: loads[number] };
+        if others.limit == PathLimit::Aside {
+            let seen = self.sights(estimate, nearest, before)?;
+            self.stage.go_back_to(start)?;
+            return Ok(Found::on_the_way(seen[seen.len() - 1].critical, CriticalKind::Estimate));
+        }
         // The look from the start is as much work as a search.
         let count = loads.len() as f64;
         let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
@@ -183,9 +220,61 @@ impl Buckling<'_, '_> {
         self.stage.go_back_to(start)?;
         if found.critical.kind == CriticalKind::Estimate {
             found.critical.load = self.extrapolate(loads[number], before)?.unwrap_or(found.critical.load);
-            self.stage.go_back_to(start)?;
+        } else if let Some(aside) = self.turned_aside(found.critical.load, estimate, nearest, before, others)? {
+            found = aside;
         }
+        self.stage.go_back_to(start)?;
         Ok(found)
+    }
+
+    /// The load at which a structure without a small imperfection buckles, where the path to a critical load turns aside
+    /// on the way: seen from smaller loads it stays where it is, as no limit point does.
+    fn turned_aside(
+        &mut self,
+        found: f64,
+        estimate: Sight,
+        nearest: f64,
+        before: usize,
+        others: &Direction,
+    ) -> Result<Option<Found>, Failure> {
+        // The path has turned aside at a load before, and ends there.
+        let is_again = others.foreseen.is_some_and(|foreseen| is_near(foreseen, found, ASIDE));
+        let is_elsewhere = |sight: &Sight| {
+            let lies_beyond = (found - sight.critical) * (sight.critical - sight.from) > 0.0;
+            !is_near(sight.critical, found, ASIDE) && (lies_beyond || is_again)
+        };
+        if !is_elsewhere(&estimate) || negative_pivots(self.stage).is_none() {
+            return Ok(None);
+        }
+        let seen = self.sights(estimate, nearest, before)?;
+        let [.., last, now] = &seen[..] else { return Ok(None) };
+        let drift = now.drift_since(last);
+        if !is_elsewhere(now) || drift > NEARLY_STEADY {
+            return Ok(None);
+        }
+        if drift > STEADY {
+            self.warn_of_turn_aside(now.critical);
+            return Ok(None);
+        }
+        self.warn_of_imperfection(now.critical, found);
+        Ok(Some(Found::on_the_way(now.critical, CriticalKind::Estimate)))
+    }
+
+    /// A critical load as it looks from the start and from points on the way to the nearest one, as far as the path
+    /// leads there.
+    fn sights(&mut self, from_start: Sight, nearest: f64, before: usize) -> Result<Vec<Sight>, Failure> {
+        let start = from_start.from;
+        let way = (nearest - start).signum();
+        let mut seen = vec![from_start];
+        for part in PARTS_OF_SIGHTS {
+            let from = start + part * (nearest - start);
+            if continue_path(self.stage, from)? != Walked::There {
+                break;
+            }
+            let Some(critical) = next_critical_load(self.stage, way, before)? else { break };
+            seen.push(Sight { from, critical });
+        }
+        Ok(seen)
     }
 
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative.
@@ -360,6 +449,15 @@ impl Buckling<'_, '_> {
         let message = format!(
             "near load factor {load} the path bends away: a structure with a smaller imperfection would buckle there; \
              the buckling load in the list lies further along the path"
+        );
+        self.stage.warn(WarningKind::BucklingEstimate, message);
+    }
+
+    fn warn_of_imperfection(&mut self, load: f64, found: f64) {
+        let message = format!(
+            "a small imperfection makes the path deviate: without it the structure would buckle at load factor {load}, \
+             which is in the list, as are its further buckling loads; the path itself loses its stiffness at load factor \
+             {found}"
         );
         self.stage.warn(WarningKind::BucklingEstimate, message);
     }
