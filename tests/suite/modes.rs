@@ -324,3 +324,68 @@ fn free_beams_in_rotating_frames_keep_their_modes() {
         assert!(with.iter().any(|s| (s.im - one.im).abs() < 1e-3 * one.im), "{one}: {with:?}");
     }
 }
+
+/// An open chain of slender bars on joints, clamped at its start, with the number of freedoms of its joints; `damping`:
+/// of the rate of strain, a time for bars of length 1.
+fn chain_of_bars(random: &mut Random, damping: f64) -> (String, usize) {
+    // Kinds with the number of their freedoms
+    let kinds = [("revolute", 1), ("universal", 2), ("spherical", 3), ("prismatic", 1), ("cylindrical", 2)];
+    let length = 10f64.powf(random.range(-3.0, 3.0));
+    let bars = 2 + (random.range(0.0, 3.0) as usize).min(2);
+    let (mut points, mut parts, mut free) = (String::from("[point]\n"), String::new(), 0);
+    let mut place = Vec3::ZERO;
+    for bar in 0..bars {
+        let next = place + random.direction() * (random.range(0.7, 1.5) * length);
+        points += &format!("a{bar} = {}\nb{bar} = {}\n", list(place), list(next));
+        let ei = 10f64.powf(random.range(1.0, 2.5));
+        let [ea, ga, j] = [1e6 / length / length, 4e5 / length / length, 1e-3 * length * length];
+        parts += &format!(
+            "[section.s{bar}]\nEA = {ea:e}\nGA = {ga:e}\nGJ = {ei}\nEI = [{ei}, {}]\nrhoA = 1\nrhoJ = [{}, {j:e}, {j:e}]\n\
+             [[beam]]\nname = \"L{bar}\"\nsection = \"s{bar}\"\nthrough = [\"a{bar}\", \"b{bar}\"]\nelements = 2\norder = 3\n",
+            2.0 * ei,
+            2.0 * j,
+        );
+        if bar > 0 {
+            let (kind, freedoms) = kinds[(random.range(0.0, 5.0) as usize).min(4)];
+            free += freedoms;
+            let axis = random.direction();
+            let axes = match kind {
+                "spherical" => String::new(),
+                "universal" => format!("axes = [{}, {}]\n", list(axis), list(axis.cross(random.direction()))),
+                _ => format!("axis = {}\n", list(axis)),
+            };
+            parts += &format!(
+                "[[joint]]\nkind = \"{kind}\"\nnodes = [\"b{}\", \"a{bar}\"]\nat = {}\n{axes}",
+                bar - 1,
+                list(place)
+            );
+        }
+        place = next;
+    }
+    let modes = free + 3;
+    let damping = format!("[damping]\nstiffness = {:e}\n", damping * length * length);
+    let clamp = "[[support]]\nat = \"a0\"\nfix = \"all\"\n";
+    (format!("{points}{parts}{clamp}{damping}[[stage]]\nkind = \"modal\"\nmodes = {modes}\n"), free)
+}
+
+/// Motions of a mechanism are exact zeros, as many as its joints have freedoms, with and without damping, and none of the
+/// other modes is left out: round-off in the zeros took 26 of 387 such lists away, and cut others short.
+#[test]
+fn motions_of_mechanisms_are_exact_zeros() {
+    for case in 0..24 {
+        let of = |damping: f64| {
+            let (text, free) = chain_of_bars(&mut Random::new(700 + case), damping);
+            (modes(&text), free, text)
+        };
+        let (undamped, free, text) = of(0.0);
+        let (damped, ..) = of(1e-6);
+        for (name, list) in [("undamped", &undamped), ("damped", &damped)] {
+            assert_eq!(list.len(), free + 3, "{case} {name}: {list:?}\n{text}");
+            let zeros = list.iter().filter(|mode| mode.omega == 0.0 && mode.growth == 0.0).count();
+            assert_eq!(zeros, free, "{case} {name}: {list:?}\n{text}");
+        }
+        for (a, b) in undamped.iter().zip(&damped).skip(free) {
+            assert!((a.omega / b.omega - 1.0).abs() < 1e-3, "{case}: {undamped:?} {damped:?}\n{text}");
+        }
+    }
+}

@@ -31,6 +31,9 @@ const MAX_ENERGY_IMBALANCE: f64 = 1e-6;
 /// displacements in lengths of the scene and rotations in radians.
 const NEGLIGIBLE_DAMPING_RATIO: f64 = 1e-14;
 
+/// The part of a rigid motion that all unknowns count as moved by, where dampers are looked at.
+const LEAST_MOVED: f64 = 1e-6;
+
 /// Damping r.C r of a rigid motion below this part of the sum of its terms is round-off.
 const NEGLIGIBLE_RATE: f64 = 1e-12;
 
@@ -257,7 +260,7 @@ impl<'a> ModeSearch<'a> {
         rigid.into_iter().for_each(|motion| search.take_out(motion));
         // Only where K is symmetric is r.K = 0, as r.(C x + M s x) = 0 needs it, and only where C is, is r.C = C r.
         if damped && symmetric && is_symmetric(&search.system.pattern, &matrices.damping) {
-            search.split_off_damped();
+            search.split_off_damped(&scales);
         }
         search
     }
@@ -268,8 +271,8 @@ impl<'a> ModeSearch<'a> {
     }
 
     /// Splits rigid motions that dampers slow down off the others.
-    fn split_off_damped(&mut self) {
-        let rates = self.rates_of_rigid_motions();
+    fn split_off_damped(&mut self, scales: &[f64]) {
+        let rates = self.rates_of_rigid_motions(scales);
         let is_damped = |(_, rate): &(DVector<f64>, f64)| *rate > 0.0;
         if !rates.iter().any(is_damped) {
             return;
@@ -294,8 +297,9 @@ impl<'a> ModeSearch<'a> {
     }
 
     /// Combinations of the rigid motions for which R.C R is diagonal, with its entries: zero where they are round-off,
-    /// beside the sum of their terms. Empty without rigid motions, or where numbers are not finite.
-    fn rates_of_rigid_motions(&self) -> Vec<(DVector<f64>, f64)> {
+    /// beside the sum of their terms. In these an unknown that a motion moves by round-off only counts as moved by a
+    /// small part. Empty without rigid motions, or where numbers are not finite.
+    fn rates_of_rigid_motions(&self, scales: &[f64]) -> Vec<(DVector<f64>, f64)> {
         let products = |values: &[f64], motions: &[Vec<f64>]| {
             let images: Vec<Vec<f64>> = motions.iter().map(|motion| self.system.multiply(values, motion)).collect();
             DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i], &images[j]))
@@ -303,7 +307,13 @@ impl<'a> ModeSearch<'a> {
         let sizes = |values: &[f64]| values.iter().map(|value| value.abs()).collect::<Vec<f64>>();
         let damping = &self.matrices.damping;
         let motions: Vec<Vec<f64>> = self.rigid.iter().map(|[motion, _]| motion.clone()).collect();
-        let terms = products(&sizes(damping), &motions.iter().map(|motion| sizes(motion)).collect::<Vec<_>>());
+        let moved = |motion: &Vec<f64>| {
+            let parts = motion.iter().zip(scales).filter(|(_, scale)| **scale > 0.0);
+            let largest = parts.map(|(part, scale)| (part / scale).abs()).fold(0.0, f64::max);
+            let least = scales.iter().map(|scale| LEAST_MOVED * largest * scale);
+            motion.iter().zip(least).map(|(part, least)| part.abs().max(least)).collect::<Vec<f64>>()
+        };
+        let terms = products(&sizes(damping), &motions.iter().map(moved).collect::<Vec<_>>());
         if motions.is_empty() || terms.iter().any(|term| !term.is_finite()) {
             return Vec::new();
         }

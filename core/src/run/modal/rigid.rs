@@ -10,12 +10,16 @@
 //!
 //! It holds in balance and out of it, under pretension and under following loads, but for dead
 //! loads that turning changes.
+//!
+//! Beams that joints or springs connect may also move against each other. Such a motion of a
+//! mechanism is found where nothing carries a force through it: K r = 0, with a rigid motion of its
+//! own for each body of connected beams.
 
 use crate::effect::{Effect, SomeIncrements};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model};
 use crate::rotation::Rotation;
-use crate::system::{Node, State, System};
+use crate::system::{Connectivity, Node, Pattern, State, System};
 use crate::tensor::Vec3;
 use nalgebra::{DMatrix, SVD};
 use std::collections::BTreeMap;
@@ -35,14 +39,14 @@ const LEAST_PART: f64 = 1e-4;
 /// none.
 const LEAST_OF_ALL: f64 = 1e-3;
 
-/// Parts in a scene of more are not looked at: each look goes over all unknowns. Their rigid
-/// motions are found as other slow modes are.
+/// Parts in a scene of more are not looked at, and so are bodies in a part of more: each look goes over all unknowns.
+/// Their rigid motions are found as other slow modes are.
 const MOST_PARTS: usize = 64;
 
 /// Sweeps for the decomposition of six columns, at most.
 const MOST_SWEEPS: usize = 1000;
 
-/// Directions of motion of one free part.
+/// Directions of motion of one body.
 const MOTIONS: usize = 6;
 
 /// Forces against a spin that are smaller than this part of their terms are what the tolerance of
@@ -72,33 +76,57 @@ pub fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>
     found
 }
 
-/// The rigid motions of all free parts, one number an equation each. The assembly holds forces and
-/// stiffness of the state.
+/// The rigid motions of all free parts and of the mechanisms in them, one number an equation each. The assembly holds
+/// forces and stiffness of the state.
 pub fn rigid_motions(assembly: &Assembly, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
-    let parts = parts(&assembly.system, places);
+    let system = &assembly.system;
+    let parts = groups(&system.pattern, places, &mut |join| {
+        (0..system.pattern.node_blocks.count())
+            .for_each(|column| system.pattern.rows_of(column).iter().for_each(|&row| join(row as usize, column)));
+    });
     if parts.len() > MOST_PARTS {
         return Vec::new();
     }
-    let loose: Vec<(FreePart, DMatrix<f64>)> = parts
-        .iter()
-        .filter_map(|part| {
-            let part = FreePart::new(part, &assembly.system, model, state);
-            let allowed = null_space(part.held(), HELD * HELD)?;
-            Some((part, allowed))
-        })
-        .collect();
-    if loose.is_empty() {
-        return Vec::new();
-    }
     // A soft spring is round-off beside stiff beams, but not beside all else, which is looked at first.
-    let others = all_but_beams(assembly, model, state);
-    let motions = loose.into_iter().filter_map(|(part, allowed)| {
+    let mut others = None;
+    let mut free_motions = |bodies: &[&[(Node, Vec3)]]| -> Vec<Vec<f64>> {
+        let part = FreePart::new(bodies, system, model, state);
+        let Some(allowed) = null_space(part.held(), HELD * HELD) else { return Vec::new() };
+        let others = others.get_or_insert_with(|| all_but_beams(assembly, model, state));
         let fields = part.fields();
-        let free = FreePart { system: &others.system, ..part }.unresisted(&fields, allowed)?;
-        let free = part.unresisted(&fields, free)?;
-        Some(combine(&fields, &free))
-    });
-    motions.flatten().collect()
+        let free = FreePart { system: &others.system, ..part.clone() }.unresisted(&fields, allowed);
+        let free = free.and_then(|free| part.unresisted(&fields, free));
+        free.map_or(Vec::new(), |free| combine(&fields, &free))
+    };
+    let of_part = |part: &Vec<(Node, Vec3)>| {
+        let as_one = free_motions(&[part]);
+        let bodies = bodies(assembly, model, part);
+        if bodies.len() == 1 || bodies.len() > MOST_PARTS {
+            return as_one;
+        }
+        let bodies: Vec<&[(Node, Vec3)]> = bodies.iter().map(|body| &body[..]).collect();
+        let of_mechanism = free_motions(&bodies);
+        // The motions of the whole part are among those of its bodies where nothing carries a force.
+        if of_mechanism.len() > as_one.len() { of_mechanism } else { as_one }
+    };
+    parts.iter().flat_map(of_part).collect()
+}
+
+/// The bodies of a part: nodes that beams connect, and single nodes.
+fn bodies(assembly: &Assembly, model: &Model, part: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
+    let pattern = &assembly.system.pattern;
+    let beams: Vec<Connectivity> = model
+        .acting(&assembly.stage)
+        .iter()
+        .filter(|effect| effect.roles().stresses.is_some())
+        .map(|effect| effect.connectivity())
+        .collect();
+    groups(pattern, part, &mut |join| {
+        for slots in beams.iter().flat_map(Connectivity::iter) {
+            let blocks = slots.iter().map(|&slot| pattern.node_blocks.of(slot));
+            blocks.clone().zip(blocks.skip(1)).for_each(|(a, b)| join(a, b));
+        }
+    })
 }
 
 /// Forces and stiffness of all effects without the elasticity of beams, which resists no rigid motion, and without the
@@ -112,55 +140,85 @@ fn all_but_beams(assembly: &Assembly, model: &Model, state: &State) -> Assembly 
     others
 }
 
-/// Nodes that are connected, by what acts between them.
-fn parts(system: &System, places: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
-    let node_blocks = &system.pattern.node_blocks;
-    let mut part_of: Vec<usize> = (0..node_blocks.count()).collect();
-    fn root(part_of: &mut [usize], mut group: usize) -> usize {
-        while part_of[group] != group {
-            part_of[group] = part_of[part_of[group]];
-            group = part_of[group];
+/// Nodes in groups that are connected; `connect` is given what joins two node blocks.
+fn groups(
+    pattern: &Pattern,
+    places: &[(Node, Vec3)],
+    connect: &mut dyn FnMut(&mut dyn FnMut(usize, usize)),
+) -> Vec<Vec<(Node, Vec3)>> {
+    let node_blocks = &pattern.node_blocks;
+    let mut group_of: Vec<usize> = (0..node_blocks.count()).collect();
+    fn root(group_of: &mut [usize], mut group: usize) -> usize {
+        while group_of[group] != group {
+            group_of[group] = group_of[group_of[group]];
+            group = group_of[group];
         }
         group
     }
     let mut join = |a: usize, b: usize| {
-        let (a, b) = (root(&mut part_of, a), root(&mut part_of, b));
-        part_of[a.max(b)] = a.min(b);
+        let (a, b) = (root(&mut group_of, a), root(&mut group_of, b));
+        group_of[a.max(b)] = a.min(b);
     };
-    for column in 0..node_blocks.count() {
-        system.pattern.rows_of(column).iter().for_each(|&row| join(row as usize, column));
-    }
-    // Nodes that share a displacement are one part.
+    connect(&mut join);
+    // Nodes that share a displacement are one group.
     places.iter().for_each(|(node, _)| join(node_blocks.of(node.u), node_blocks.of(node.p)));
-    let mut parts: BTreeMap<usize, Vec<(Node, Vec3)>> = BTreeMap::new();
+    let mut groups: BTreeMap<usize, Vec<(Node, Vec3)>> = BTreeMap::new();
     for &(node, place) in places {
-        parts.entry(root(&mut part_of, node_blocks.of(node.u))).or_default().push((node, place));
+        groups.entry(root(&mut group_of, node_blocks.of(node.u))).or_default().push((node, place));
     }
-    parts.into_values().collect()
+    groups.into_values().collect()
 }
 
-/// A free part of a structure in a state: nodes that are connected.
+/// A body in a state: nodes that move rigidly together.
 #[derive(Clone, Copy)]
-struct FreePart<'p> {
+struct Body<'p> {
     nodes: &'p [(Node, Vec3)],
-    /// The forces and the stiffness that are looked at
-    system: &'p System,
-    /// Those of all effects
-    whole: &'p System,
-    state: &'p State,
     centre: Vec3,
     /// The distance of the farthest node from the centre; turns are measured by what they move, so
     /// that all motions compare
     extent: f64,
 }
 
-impl<'p> FreePart<'p> {
-    fn new(nodes: &'p [(Node, Vec3)], system: &'p System, model: &Model, state: &'p State) -> Self {
+impl<'p> Body<'p> {
+    fn new(nodes: &'p [(Node, Vec3)], model: &Model, state: &State) -> Self {
         let now = |(node, place): &(Node, Vec3)| *place + state.q[node.u as usize];
         let centre = nodes.iter().fold(Vec3::ZERO, |sum, node| sum + now(node)) * (1.0 / nodes.len() as f64);
         let extent = nodes.iter().map(|node| (now(node) - centre).norm()).fold(0.0, f64::max);
-        let extent = if extent > 0.0 { extent } else { model.length };
-        Self { nodes, system, whole: system, state, centre, extent }
+        Self { nodes, centre, extent: if extent > 0.0 { extent } else { model.length } }
+    }
+
+    /// The size of a motion as it is measured.
+    fn unit(&self, number: usize) -> f64 {
+        if number < 3 { 1.0 } else { 1.0 / self.extent }
+    }
+
+    /// A rigid motion of a node: its displacement and the change of its rotation vector.
+    fn moved(&self, (node, place): &(Node, Vec3), number: usize, state: &State) -> (Vec3, Vec3) {
+        let axis = Vec3::UNIT[number % 3];
+        if number < 3 {
+            return (axis, Vec3::ZERO);
+        }
+        let from_centre = *place + state.q[node.u as usize] - self.centre;
+        let rotation = Rotation::new(state.q[node.p as usize]);
+        (axis.cross(from_centre), rotation.t_inverse() * rotation.r.transpose_mul(axis))
+    }
+}
+
+/// A free part of a structure in a state: a body, or bodies that something else than beams connects.
+#[derive(Clone)]
+struct FreePart<'p> {
+    bodies: Vec<Body<'p>>,
+    /// The forces and the stiffness that are looked at
+    system: &'p System,
+    /// Those of all effects
+    whole: &'p System,
+    state: &'p State,
+}
+
+impl<'p> FreePart<'p> {
+    fn new(bodies: &[&'p [(Node, Vec3)]], system: &'p System, model: &Model, state: &'p State) -> Self {
+        let bodies = bodies.iter().map(|nodes| Body::new(nodes, model, state)).collect();
+        Self { bodies, system, whole: system, state }
     }
 
     /// The combinations of the columns of `allowed` against which nothing acts; `None` where there are none. `fields`: see
@@ -176,53 +234,40 @@ impl<'p> FreePart<'p> {
         (!free.is_empty()).then(|| allowed * DMatrix::from_columns(&free))
     }
 
-    /// The motions of the part, one number an equation each.
+    /// The rigid motions of the bodies, one number an equation each.
     fn fields(&self) -> Vec<Vec<f64>> {
-        (0..MOTIONS).map(|number| self.field(number)).collect()
-    }
-
-    /// The size of a motion as it is measured.
-    fn unit(&self, number: usize) -> f64 {
-        if number < 3 { 1.0 } else { 1.0 / self.extent }
-    }
-
-    /// A rigid motion of a node: its displacement and the change of its rotation vector.
-    fn moved(&self, (node, place): &(Node, Vec3), number: usize) -> (Vec3, Vec3) {
-        let axis = Vec3::UNIT[number % 3];
-        if number < 3 {
-            return (axis, Vec3::ZERO);
-        }
-        let from_centre = *place + self.state.q[node.u as usize] - self.centre;
-        let rotation = Rotation::new(self.state.q[node.p as usize]);
-        (axis.cross(from_centre), rotation.t_inverse() * rotation.r.transpose_mul(axis))
+        self.bodies.iter().flat_map(|body| (0..MOTIONS).map(|number| self.field(body, number))).collect()
     }
 
     /// The Gram matrix of what the motions do to held directions.
     fn held(&self) -> DMatrix<f64> {
         let dof_map = &self.system.pattern.dof_map;
-        let mut held = DMatrix::<f64>::zeros(MOTIONS, MOTIONS);
-        for node in self.nodes {
-            let held_parts: [[f64; 6]; MOTIONS] = std::array::from_fn(|number| {
-                let (u, p) = self.moved(node, number);
-                let u = dof_map.held_part(node.0.u, u);
-                let p = dof_map.held_part(node.0.p, p) * self.extent;
-                let [a, b] = [u.0, p.0].map(|v| v.map(|v| v * self.unit(number)));
-                [a[0], a[1], a[2], b[0], b[1], b[2]]
-            });
-            add_gram(&mut held, &held_parts);
+        let count = MOTIONS * self.bodies.len();
+        let mut held = DMatrix::<f64>::zeros(count, count);
+        for (body, first) in self.bodies.iter().zip((0..).step_by(MOTIONS)) {
+            for node in body.nodes {
+                let held_parts: [[f64; 6]; MOTIONS] = std::array::from_fn(|number| {
+                    let (u, p) = body.moved(node, number, self.state);
+                    let u = dof_map.held_part(node.0.u, u);
+                    let p = dof_map.held_part(node.0.p, p) * body.extent;
+                    let [a, b] = [u.0, p.0].map(|v| v.map(|v| v * body.unit(number)));
+                    [a[0], a[1], a[2], b[0], b[1], b[2]]
+                });
+                add_gram(&mut held, first, &held_parts);
+            }
         }
         held
     }
 
-    /// A motion of the part, one number an equation.
-    fn field(&self, number: usize) -> Vec<f64> {
+    /// A motion of a body, one number an equation.
+    fn field(&self, body: &Body, number: usize) -> Vec<f64> {
         let dof_map = &self.system.pattern.dof_map;
         let mut out = vec![0.0; dof_map.count()];
         let mut motion = vec![Vec3::ZERO; self.state.q.len()];
-        for node in self.nodes {
-            let (u, p) = self.moved(node, number);
-            motion[node.0.u as usize] = u * self.unit(number);
-            motion[node.0.p as usize] = p * self.unit(number);
+        for node in body.nodes {
+            let (u, p) = body.moved(node, number, self.state);
+            motion[node.0.u as usize] = u * body.unit(number);
+            motion[node.0.p as usize] = p * body.unit(number);
         }
         dof_map.gather(|slot| motion[slot], &mut out);
         out
@@ -241,8 +286,11 @@ impl<'p> FreePart<'p> {
         let mut forces: Vec<Vec<f64>> = Vec::new();
         for (k, motion) in combine(fields, allowed).iter().enumerate() {
             let mut force = system.multiply(&system.values, motion);
-            let turn = Vec3([3, 4, 5].map(|number| allowed[(number, k)] / self.extent));
-            let expected = self.turned_forces(motion, turn);
+            let expected = match &self.bodies[..] {
+                [body] => self.turned_forces(body, motion, Vec3([3, 4, 5].map(|i| allowed[(i, k)] / body.extent))),
+                // Of bodies that move against each other nothing is known of the forces between them.
+                _ => vec![0.0; count],
+            };
             force.iter_mut().zip(&expected).for_each(|(force, expected)| *force -= expected);
             let absolute: Vec<f64> =
                 motion.iter().zip(&usual).map(|(v, usual)| v.abs().max(LEAST_PART * usual)).collect();
@@ -267,13 +315,13 @@ impl<'p> FreePart<'p> {
         DMatrix::from_fn(rows.len(), columns, over_terms).qr().r()
     }
 
-    /// The change of the forces on the part where they turn with it, one number an equation.
-    fn turned_forces(&self, motion: &[f64], turn: Vec3) -> Vec<f64> {
+    /// The change of the forces on a body where they turn with it, one number an equation.
+    fn turned_forces(&self, body: &Body, motion: &[f64], turn: Vec3) -> Vec<f64> {
         let dof_map = &self.system.pattern.dof_map;
         let mut field = vec![Vec3::ZERO; self.state.q.len()];
         let mut change = field.clone();
         dof_map.scatter(motion, None, &mut field);
-        for (node, _) in self.nodes {
+        for (node, _) in body.nodes {
             let (u, p) = (node.u as usize, node.p as usize);
             change[u] = turn.cross(self.system.total(u));
             let rotation = Rotation::new(self.state.q[p]);
@@ -298,10 +346,11 @@ fn combine(fields: &[Vec<f64>], coefficients: &DMatrix<f64>) -> Vec<Vec<f64>> {
     (0..coefficients.ncols()).map(sum).collect()
 }
 
-fn add_gram(gram: &mut DMatrix<f64>, columns: &[[f64; 6]; MOTIONS]) {
+/// Adds the products of columns to the square on the diagonal that begins at `first`.
+fn add_gram(gram: &mut DMatrix<f64>, first: usize, columns: &[[f64; 6]; MOTIONS]) {
     for i in 0..MOTIONS {
         for j in 0..MOTIONS {
-            gram[(i, j)] += columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum::<f64>();
+            gram[(first + i, first + j)] += columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum::<f64>();
         }
     }
 }
