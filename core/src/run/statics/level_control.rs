@@ -257,9 +257,16 @@ impl LevelControl<'_, '_> {
         } else {
             "load levels do not converge".into()
         };
+        let friction = match self.stage.rubs() && self.stage.state.contacts.touches() {
+            true => {
+                " (but friction in it is what that motion has left, not that of the loads: use more levels, or a dynamic \
+                 stage, if it matters)"
+            }
+            false => "",
+        };
         let message = format!(
             "{why}: the structure was moved by all forces against an artificial damping until it came to rest; the \
-             state at {at} is in equilibrium without that damping"
+             state at {at} is in equilibrium without that damping{friction}"
         );
         self.stage.warn(WarningKind::CameToRest, message);
         self.stability.signature = self.stability.look(self.stage);
