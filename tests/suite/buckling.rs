@@ -185,7 +185,7 @@ fn nearly_perfect_portals_buckle_where_perfect_ones_do() {
     for (stiffness, second, reference) in
         [(1e5, 0.99, 7.4158), (1e5, 0.8, 8.1974), (1e6, 0.99, 7.4162), (1e6, 0.5, 9.8261), (1e6, 0.0, 14.586)]
     {
-        for start in [0.0, 0.1, 0.3, 0.6] {
+        for start in [0.0, 0.3] {
             let length = 10f64.powf(random.range(-3.0, 3.0));
             let load = start * reference;
             let text = portal(stiffness, second, load, 1, length, random.direction());
@@ -204,11 +204,129 @@ fn nearly_perfect_portals_have_further_loads() {
     for (length, start) in [(1.0, 0.0), (1e3, 1.0), (1e-3, 4.0)] {
         let text = portal(1e6, 0.999, start, 3, length, Vec3([0.0, 0.6, 0.8]));
         let found = critical_loads(&text);
-        assert_eq!(found.len(), 3, "{found:?}");
+        assert!(found.len() == 3 && found.iter().all(|found| found.kind == CriticalKind::Estimate), "{found:?}");
         for (found, perfect) in found.iter().zip(&perfect) {
             let load = found.load * if start > 0.0 { start } else { 1.0 };
             // The mean of the loads is smaller by 5e-4.
             assert!((load / perfect.load - 1.0).abs() < 2e-3, "{load} for {}: {found:?}", perfect.load);
         }
     }
+}
+
+/// A hinged column whose head comes down on a stiff post at 0.7 of Euler's load: it buckles at 11.53 with the post's help,
+/// though all looks from smaller loads see Euler's 9.87.
+#[test]
+fn a_contact_on_the_way_is_no_imperfection() {
+    let text = r#"
+[point]
+foot = [0, 0, 0]
+t = [0, 0, 1]
+pf = [0.5, 0, 0]
+pt = [0.5, 0, 0.5]
+[section.s]
+EA = 1e4
+GA = 1e4
+GJ = 1
+EI = 1
+[section.post]
+EA = 1e4
+GA = 1e4
+GJ = 1e3
+EI = 1e3
+[[beam]]
+name = "col"
+section = "s"
+through = ["foot", "t"]
+elements = 6
+order = 3
+[[beam]]
+name = "post"
+section = "post"
+through = ["pf", "pt"]
+elements = 2
+[[support]]
+at = "foot"
+fix = ["ux", "uy", "uz", "rx", "rz"]
+[[support]]
+at = "t"
+fix = ["ux", "uy", "rx", "rz"]
+[[support]]
+at = "pf"
+fix = "all"
+[[surface]]
+name = "head"
+kind = "plane"
+point = [0, 0, 0.98931]
+normal = [0, 0, 1]
+on = "pt"
+[[contact]]
+name = "c"
+nodes = ["t"]
+surfaces = ["head"]
+radius = 0.01
+stiffness = 1e5
+[[load]]
+at = "t"
+force = [0, 0, -1]
+[[stage]]
+kind = "static"
+steps = 1
+[[stage]]
+kind = "buckling"
+modes = 1
+"#;
+    let [found] = critical_loads(text)[..] else { panic!("one load") };
+    // 6.9 on the column alone, and the rest shared with the post, whose half length is twice as stiff.
+    assert!(found.kind == CriticalKind::Branch && (found.load / 11.47 - 1.0).abs() < 0.01, "{found:?}");
+}
+
+/// A toggle of legs of two lengths under a push snaps at its limit point, which ends the list: no load behind it is one.
+#[test]
+fn a_limit_point_with_a_push_is_listed_once() {
+    let text = r#"
+[point]
+a = [-1, 0, 0]
+b = [0, 0, 1.1248]
+c = [1.2, 0, 0]
+[section.s]
+EA = 46786
+GA = 46786
+GJ = 1
+EI = 1
+[[beam]]
+name = "qab"
+section = "s"
+through = ["a", "b"]
+elements = 3
+order = 2
+[[beam]]
+name = "qbc"
+section = "s"
+through = ["b", "c"]
+elements = 3
+order = 2
+[[support]]
+at = "a"
+fix = "all"
+[[support]]
+at = "c"
+fix = "all"
+[[support]]
+at = "qab@0.5"
+fix = ["uy", "rx", "rz"]
+[[support]]
+at = "qbc@0.5"
+fix = ["uy", "rx", "rz"]
+[[support]]
+at = "b"
+fix = ["uy", "rx", "rz"]
+[[load]]
+at = "b"
+force = [0.001, 0, -1]
+[[stage]]
+kind = "buckling"
+modes = 3
+"#;
+    let [found] = critical_loads(text)[..] else { panic!("one load") };
+    assert!(found.kind == CriticalKind::Limit && (found.load - 11.84).abs() < 0.02, "{found:?}");
 }

@@ -1398,6 +1398,7 @@ columns = ["u", "contact"]
 #[test]
 fn boxes_between_nodes_are_not_passed() {
     let mut random = Random::new(31);
+    let mut finished = [0; 4];
     for order in 1..=3 {
         for _ in 0..6 {
             let (place, half) = (random.range(0.3, 0.9), random.range(0.015, 0.05));
@@ -1405,14 +1406,89 @@ fn boxes_between_nodes_are_not_passed() {
             for steps in [1, 3, 8] {
                 let simulation = attempt(&text(steps));
                 if let Err(failure) = &simulation.result {
-                    assert_eq!(order, 3, "{failure:?}\n{}", text(steps));
+                    let is_named = [FailureKind::ContactPassed, FailureKind::NotConverged].contains(&failure.kind());
+                    assert!(order == 3 && is_named, "{failure:?}\n{}", text(steps));
                     continue;
                 }
+                finished[order] += 1;
                 let gap = simulation.end("c.gap");
                 assert!(gap.abs() < 1e-4 && simulation.end("c.normal") > 0.0, "{gap}\n{}", text(steps));
             }
         }
     }
+    assert!(finished[3] > 6, "{finished:?}");
     let inside = attempt(&box_under_an_element(0.55, 0.03, 1, 4, 0.0)).result.unwrap_err();
     assert_eq!(inside.kind(), FailureKind::ContactStart, "{inside:?}");
+}
+
+/// A beam that is drawn over a drum by more than its elements in each level has touched all the time: its levels are not
+/// cut for it.
+#[test]
+fn a_contact_that_slides_on_has_not_touched_late() {
+    let text = |elements: usize| {
+        format!(
+            r#"
+[point]
+a = [-1.5, 0.1, 0.5501]
+b = [1.5, 0.1, 0.5501]
+[section.s]
+EA = 1e5
+GA = 4e4
+GJ = 10
+EI = 10
+[[beam]]
+name = "w"
+section = "s"
+through = ["a", "b"]
+elements = {elements}
+[[support]]
+at = "a"
+fix = ["uy", "rx"]
+[[support]]
+at = "b"
+fix = ["uy"]
+[[support]]
+at = "a"
+fix = ["ux"]
+stages = [1]
+[[motion]]
+at = "a"
+uz = -0.3
+[[motion]]
+at = "b"
+uz = -0.3
+[[motion]]
+at = "a"
+ux = 0.4
+stages = [2]
+[[surface]]
+name = "m"
+kind = "cylinder"
+from = [0, -1, 0]
+to = [0, 1, 0]
+radius = 0.5
+[[contact]]
+name = "c"
+beams = ["w"]
+surfaces = ["m"]
+radius = 0.05
+friction = 0.3
+[[stage]]
+kind = "static"
+steps = 6
+[[stage]]
+kind = "static"
+steps = 3
+[output]
+nodes = ["a"]
+columns = ["reaction", "contact"]
+"#
+        )
+    };
+    for elements in [60, 200] {
+        let simulation = simulate(&text(elements));
+        // The first touch takes five of them.
+        let cutbacks = simulation.counters.cutbacks;
+        assert!(cutbacks <= 8, "{elements} elements: {cutbacks} cut-backs");
+    }
 }

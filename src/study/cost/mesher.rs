@@ -96,10 +96,9 @@ impl Mesher<'_> {
             let Sampler { places, outputs, .. } = self.sampler;
             let unit = if let Some(placement) = &self.placement {
                 placement.unit(beam, piece)
-            } else if self.keeps_places {
-                places.unit(Piece { beam, number: piece }, orders[beam], outputs, 2 * count)
             } else {
-                1
+                let outputs = self.keeps_places.then_some(&outputs[..]);
+                places.unit(Piece { beam, number: piece }, orders[beam], outputs, 2 * count)
             };
             change(count, unit)
         };

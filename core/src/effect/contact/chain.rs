@@ -33,8 +33,8 @@ const ROUNDED_PLACE: f64 = 1e-9;
 /// not beyond it, if the cosine between its direction and the beam is below this.
 pub(super) const CAP_COSINE: f64 = 0.5;
 
-/// The shortest step along an element that is looked at, over the radius of the beam.
-const SHORTEST_LOOK: f64 = 0.1;
+/// The shortest step on a way that is looked at, over the radius of what goes it.
+pub(super) const SHORTEST_LOOK: f64 = 0.1;
 
 /// A beam or a body against one surface.
 #[derive(Clone, Debug)]
@@ -51,6 +51,15 @@ impl Deref for Chain {
     fn deref(&self) -> &Strand {
         &self.strand
     }
+}
+
+/// An element whose centre line is inside of a box or a mesh between nodes that are outside. No edge pushes it out, since
+/// that needs a centre line outside of its faces.
+pub(super) struct Crossing {
+    /// Number of the element in the chain
+    pub(super) element: usize,
+    /// The penetration, a length
+    pub(super) depth: f64,
 }
 
 /// A point that may touch the surface.
@@ -136,20 +145,19 @@ impl Chain {
         self.seen(carrier, at).into_iter().enumerate().find_map(|(node, place)| Some((node, depth(place)?)))
     }
 
-    /// The first node of an element that crosses a box or a mesh, and its penetration: its centre line is
-    /// inside between nodes that are outside. No edge pushes it out, since that needs a centre line
-    /// outside of its faces.
-    pub(super) fn crossing(&self, surface: &Surface, carrier: &Carrier, at: &State) -> Option<(usize, f64)> {
+    /// The elements that cross a box or a mesh.
+    pub(super) fn crossings(&self, surface: &Surface, carrier: &Carrier, at: &State) -> Vec<Crossing> {
         if self.order == 0 || !surface.has_edges() {
-            return None;
+            return Vec::new();
         }
         let places = self.seen(carrier, at);
         let regime = at.contacts.regime;
         let mut seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points: &[], regime };
-        (0..self.elements()).find_map(|k| {
-            let height = if seen.is_free(k) { 0.0 } else { seen.least_height_between_nodes(k) };
-            (height < 0.0).then_some((k * self.order, self.radius - height))
-        })
+        let crossing = |element: usize| {
+            let height = if seen.is_free(element) { None } else { seen.least_height_between_nodes(element) };
+            height.map(|height| Crossing { element, depth: self.radius - height })
+        };
+        (0..self.elements()).filter_map(crossing).collect()
     }
 
     /// Places of the nodes in the coordinates of a surface.
@@ -279,23 +287,25 @@ impl SeenChain<'_> {
         is_free
     }
 
-    /// The least distance of the centre line of element `k` from the surface between nodes that are
-    /// outside; zero where one is not. Steps along it are as long as the distance, which cannot become
-    /// zero in a shorter one.
-    fn least_height_between_nodes(&self, k: usize) -> f64 {
+    /// The least distance of the centre line of element `k` from the surface, where it is inside of it between nodes that
+    /// are outside. Steps along it are as long as the distance, which cannot become zero in a shorter one.
+    fn least_height_between_nodes(&self, k: usize) -> Option<f64> {
         let places = self.places_of(k);
         let height = |place: Vec3| self.surface.value(place, self.chain.radius).unwrap_or(f64::INFINITY);
         if places.iter().any(|place| height(*place) < 0.0) {
-            return 0.0;
+            return None;
         }
-        let length = REACH[places.len()] * places.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum::<f64>();
+        // Markov's inequality bounds the slope of a polynomial by its size.
+        let middle = self.place(k, 0.5);
+        let farthest = places.iter().map(|place| (*place - middle).norm()).fold(0.0, f64::max);
+        let slope = 2.0 * (self.chain.order * self.chain.order) as f64 * REACH[places.len()] * farthest;
         let (mut least, mut s) = (0.0f64, 0.0);
         while s < 1.0 {
             let here = height(self.place(k, s));
             least = least.min(here);
-            s += here.max(SHORTEST_LOOK * self.chain.radius) / length;
+            s += here.max(SHORTEST_LOOK * self.chain.radius) / slope;
         }
-        least
+        (least < 0.0).then_some(least)
     }
 
     fn minima(&self, k: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> Minima {

@@ -209,7 +209,8 @@ impl<'a> ChainNow<'a> {
 
     /// The factor on the stiffness of stick that a point needs.
     pub(super) fn needed_stick_factor(&self, point: &PointNow) -> f64 {
-        let limit = point.friction_limit();
+        let Some(law) = &point.law.friction else { return 0.0 };
+        let limit = law.limit(point.state.normal_force.force);
         let element = point.candidate.element;
         let length = self.chain.element_length(element);
         self.laws.needed_stick_factor(limit, &self.chain.stiffness[element], length, self.chain.radius)
@@ -230,15 +231,5 @@ impl PointNow<'_> {
     /// The work of friction since the last converged state.
     pub(super) fn friction_work(&self) -> f64 {
         self.candidate.weight * self.state.traction.work(&self.law.carried, self.state.normal)
-    }
-
-    /// The amount of friction, without the weight.
-    pub(super) fn friction(&self) -> f64 {
-        self.state.traction.force.norm()
-    }
-
-    /// The limit of friction, without the weight.
-    pub(super) fn friction_limit(&self) -> f64 {
-        self.law.friction.as_ref().map_or(0.0, |law| law.coefficient * self.state.normal_force.force)
     }
 }

@@ -1,6 +1,8 @@
 //! Points that have come into contact in a level: what they moved before they touched counts as
 //! sliding.
 
+use crate::kernel::contact::{FrictionLaw, PointState};
+
 /// The part of the friction of a contact that its new points have, beyond which they decide it.
 const DECISIVE: f64 = 0.5;
 
@@ -16,6 +18,21 @@ struct Friction {
     of_all: f64,
 }
 
+/// Friction at a point.
+pub(super) struct PointFriction {
+    force: f64,
+    /// The largest that it can be
+    limit: f64,
+}
+
+impl PointFriction {
+    /// That of a point with a part `weight` of the force.
+    pub fn of(law: Option<&FrictionLaw>, state: &PointState, weight: f64) -> Self {
+        let limit = law.map_or(0.0, |law| law.limit(state.normal_force.force));
+        Self { force: weight * state.traction.force.norm(), limit: weight * limit }
+    }
+}
+
 /// The friction of all contacts at the end of a level.
 pub(super) struct LateTouch {
     of_contacts: Vec<Friction>,
@@ -27,13 +44,12 @@ impl LateTouch {
         Self { of_contacts: vec![Friction::default(); contacts] }
     }
 
-    /// Adds a point of a contact: its friction, the limit of it, and whether the point was apart when
-    /// the level began.
-    pub fn add(&mut self, contact: usize, friction: f64, limit: f64, was_apart: impl FnOnce() -> bool) {
+    /// Adds a point of a contact; `was_apart`: when the level began.
+    pub fn add(&mut self, contact: usize, point: PointFriction, was_apart: impl FnOnce() -> bool) {
         let sums = &mut self.of_contacts[contact];
-        sums.of_all += friction;
-        if friction > NEGLIGIBLE * limit && was_apart() {
-            sums.of_new += friction;
+        sums.of_all += point.force;
+        if point.force > NEGLIGIBLE * point.limit && was_apart() {
+            sums.of_new += point.force;
         }
     }
 

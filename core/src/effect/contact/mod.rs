@@ -35,7 +35,7 @@ use crate::system::{
 };
 use crate::tensor::Vec3;
 use chain_now::{ChainNow, before_of};
-use late_touch::LateTouch;
+use late_touch::{LateTouch, PointFriction};
 use laws::{RELEVANT_FORCE, ROUNDED};
 use pairs::PairRole;
 use std::sync::Arc;
@@ -249,6 +249,24 @@ impl SurfaceContacts {
             });
         }
         strayed
+    }
+
+    /// A slot of an element that crosses a box or a mesh, and that no point pushes out.
+    fn crossing(&self, number: usize, at: &State) -> Option<Slot> {
+        if !self.is_near(number, at) {
+            return None;
+        }
+        let (chain, surface) = (&self.chains[number], &self.surfaces[self.chains[number].surface]);
+        let crossings = chain.crossings(&surface.surface, &surface.carrier(at, Weights::NONE), at);
+        if crossings.is_empty() {
+            return None;
+        }
+        let mut pushed = Vec::new();
+        self.chain_now(number, at, Weights::NONE).each_point(Weights::NONE, &mut |point, _| {
+            pushed.extend((point.state.normal_force.force > 0.0).then_some(point.candidate.element));
+        });
+        let lost = crossings.into_iter().find(|crossing| !pushed.contains(&crossing.element))?;
+        Some(chain.nodes_of(lost.element)[0].node.u)
     }
 
     fn damping_power(&self, at: &State) -> f64 {
@@ -530,19 +548,13 @@ impl Contacts for SurfaceContacts {
             if !chain.laws.rubs() {
                 return;
             }
-            let mut active = Vec::new();
-            let mut forces = Vec::new();
+            // A point of a contact that goes on has come along the beam.
+            let touched = before.contacts.chains.get(number).is_some_and(|memory| !memory.points.is_empty());
             chain.each_point(Weights::NONE, &mut |point, _| {
-                if point.state.normal_force.force > 0.0 {
-                    active.push(*point.candidate);
-                    forces.push([point.friction(), point.friction_limit()].map(|force| point.candidate.weight * force));
-                }
+                let was_apart = || !touched && chain.gap_in(point.candidate, before) > chain.laws.penetration;
+                let friction = PointFriction::of(point.law.friction.as_ref(), &point.state, point.candidate.weight);
+                late.add(chain.chain.contact, friction, was_apart);
             });
-            let predecessors = chain.chain.predecessors(&active, before.contacts.chains.get(number));
-            for ((candidate, predecessors), [friction, limit]) in active.iter().zip(&predecessors).zip(forces) {
-                let was_apart = || predecessors.is_none() && chain.gap_in(candidate, before) > chain.laws.penetration;
-                late.add(chain.chain.contact, friction, limit, was_apart);
-            }
         });
         self.pairs().add_late(before, at, &mut late);
         late.is_decisive()
@@ -570,9 +582,11 @@ impl Contacts for SurfaceContacts {
         for (chain, laws, surface) in self.acting(at).filter(|(_, laws, _)| begins(laws.amplitude)) {
             let carrier = surface.carrier(at, Weights::NONE);
             let lost = chain.lost_node(&surface.surface, &carrier, at, laws.penetration);
-            let Some((node, depth)) = lost.or_else(|| chain.crossing(&surface.surface, &carrier, at)) else {
-                continue;
+            let crossing = || {
+                let first = chain.crossings(&surface.surface, &carrier, at).into_iter().next()?;
+                Some((first.element * chain.order, first.depth))
             };
+            let Some((node, depth)) = lost.or_else(crossing) else { continue };
             if deepest.as_ref().is_none_or(|deepest| depth > deepest.depth) {
                 let slot = chain.nodes[node].node.u;
                 deepest = Some(Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth });
@@ -623,11 +637,11 @@ impl Contacts for SurfaceContacts {
 
     fn passed(&self, from: &State, to: &State) -> Option<Slot> {
         let of_chain = |(chain, _, surface): (&Chain, &ContactLaws, &SceneSurface)| {
-            let crossing = || chain.crossing(&surface.surface, &surface.carrier(to, Weights::NONE), to);
-            let passed = passing::passed(chain, surface, from, to).or_else(|| Some(crossing()?.0));
-            passed.map(|node| chain.nodes[node].node.u)
+            passing::passed(chain, surface, from, to).map(|node| chain.nodes[node].node.u)
         };
+        let crossing = |number: usize| self.crossing(number, to);
         let of_surfaces = self.acting(to).find_map(of_chain).or_else(|| self.strayed(from, to));
+        let of_surfaces = of_surfaces.or_else(|| (0..self.chains.len()).find_map(crossing));
         of_surfaces.or_else(|| self.pairs().turned_over(to)).or_else(|| self.pairs().passed(from, to))
     }
 

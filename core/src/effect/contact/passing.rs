@@ -1,14 +1,11 @@
 //! Beams and bodies that pass through a surface, or out of it on another side, within one step.
 
-use super::chain::Chain;
+use super::chain::{Chain, SHORTEST_LOOK};
 use super::surface::SceneSurface;
 use crate::kernel::Weights;
 use crate::kernel::contact::Surface;
 use crate::system::State;
 use crate::tensor::Vec3;
-
-/// The shortest step on a way that is looked at, over the radius of the sphere that goes it.
-const SHORTEST_LOOK: f64 = 0.1;
 
 /// Places of an element whose ways are looked at, at most, beside its nodes.
 const MOST_PLACES: f64 = 32.0;

@@ -79,11 +79,6 @@ impl Predecessors {
         self.own.into_iter().chain(self.merged.iter().copied())
     }
 
-    /// True if the candidate is the successor of no point.
-    pub fn is_none(&self) -> bool {
-        self.own.is_none() && self.merged.is_empty()
-    }
-
     /// The traction that a candidate of this weight takes over. `point` has the memory of a point by its
     /// number. Tractions of points that merge add up, turned to the first normal.
     pub fn traction<'a>(&self, weight: f64, point: &dyn Fn(usize) -> &'a PointMemory) -> CarriedTraction {

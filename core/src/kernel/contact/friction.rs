@@ -178,10 +178,15 @@ impl Traction {
 }
 
 impl FrictionLaw {
+    /// The largest traction of a contact with the force `p`.
+    pub fn limit<T: Real>(&self, p: T) -> T {
+        p * self.coefficient
+    }
+
     /// The traction of a contact with the normal `n`, the force `p` and the sliding `a`.
     pub fn traction<T: Real>(&self, carried: &CarriedTraction, n: Vec3<T>, p: T, a: Vec3<T>) -> Traction<T> {
         let trial = self.trial(carried, n, a);
-        let limit = p * self.coefficient;
+        let limit = self.limit(p);
         let size = trial.force.norm();
         let is_tied = size.largest() > 0.0 && size.largest() >= AT_LIMIT * limit.largest();
         let goes_on = self.goes_on && carried.slides && is_tied;

@@ -50,10 +50,13 @@ const PARTS_OF_SIGHTS: [f64; 2] = [0.3, 0.6];
 /// The part of a load to which its estimate from the start is right where the tangent varies evenly up to it: it is no
 /// limit point.
 const WELL_FORESEEN: f64 = 2e-3;
+/// The part of a load by which another one lies elsewhere.
+const ELSEWHERE: f64 = 1e-2;
 /// How far a critical load as it looks may move, over the load from which it is seen, where it is that of a structure
 /// without a small imperfection.
 const STEADY: f64 = 1e-2;
-/// The same where a load far beyond it may be the right one, which is told.
+/// How far a critical load as it looks may move, over the load from which it is seen, where the path may well turn aside
+/// there, which is told.
 const NEARLY_STEADY: f64 = 5e-2;
 /// Looks of one extrapolation.
 const MOST_EXTRAPOLATIONS: usize = 48;
@@ -71,18 +74,44 @@ const NOTHING_BUCKLES: &str = "no load factor is found at which the scene loses 
 /// Limit points whose loads differ by less, relative to the load, are one point.
 const SAME_LIMIT: f64 = 1e-6;
 
+/// The path behind a critical load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Behind {
+    /// It goes on.
+    GoesOn,
+    /// Load control has ended there on its way, at a limit point or where an imperfection turns the path aside.
+    Ends,
+    /// It belongs to an imperfect structure, whose further critical loads are not those of the perfect one.
+    Imperfect,
+}
+
 /// A critical load on its path.
 struct Found {
     critical: CriticalLoad,
-    /// True if load control has ended there on its way, at a limit point or where an imperfection turns the path aside
-    ends_path: bool,
+    behind: Behind,
 }
 
 impl Found {
     /// A load that was reached, or only estimated, without an end of the path.
     fn on_the_way(load: f64, kind: CriticalKind) -> Self {
-        Self { critical: CriticalLoad { load, kind }, ends_path: false }
+        Self { critical: CriticalLoad { load, kind }, behind: Behind::GoesOn }
     }
+
+    /// The load of a structure without its imperfection.
+    fn of_the_perfect(load: f64) -> Self {
+        Self { critical: CriticalLoad { load, kind: CriticalKind::Estimate }, behind: Behind::Imperfect }
+    }
+}
+
+/// A critical load that is searched.
+#[derive(Clone, Copy)]
+struct Aim {
+    /// As it looks from the start
+    sight: Sight,
+    /// The number of others before it
+    before: usize,
+    /// The first one in its direction, as it looks from the start
+    nearest: f64,
 }
 
 /// How a scene answers to a unit of load.
@@ -100,7 +129,7 @@ fn is_near(a: f64, b: f64, part: f64) -> bool {
 
 /// The critical loads above the present one so far, or those below it.
 #[derive(Clone, Copy, Default)]
-struct Direction {
+struct SoFar {
     limit: PathLimit,
     /// The estimate of the last one from the start, if it was right
     foreseen: Option<f64>,
@@ -116,21 +145,20 @@ enum PathLimit {
     At(f64),
     /// The search for the next critical load has come to the same load: none lies before it.
     Reached,
-    /// A small imperfection turns the path aside at the last critical load: the next ones are those of a structure
-    /// without it.
-    Aside,
+    /// A small imperfection turns the path aside: the next critical loads are those of a structure without it.
+    Imperfect,
 }
 
 impl PathLimit {
     /// The limit after one more critical load.
     fn after(self, next: &Found) -> Self {
-        let Found { critical: CriticalLoad { load, kind }, ends_path } = *next;
-        let is_same = |limit: f64| ends_path && is_near(load, limit, SAME_LIMIT);
+        let Found { critical: CriticalLoad { load, kind }, behind } = *next;
+        let is_same = |limit: f64| behind == Behind::Ends && is_near(load, limit, SAME_LIMIT);
         match self {
             Self::At(limit) if is_same(limit) => Self::Reached,
-            _ if ends_path || kind == CriticalKind::Limit => Self::At(load),
-            _ if kind == CriticalKind::Estimate => Self::Aside,
-            Self::Open | Self::At(_) | Self::Reached | Self::Aside => Self::Open,
+            _ if behind == Behind::Ends || kind == CriticalKind::Limit => Self::At(load),
+            _ if behind == Behind::Imperfect => Self::Imperfect,
+            Self::Open | Self::At(_) | Self::Reached | Self::Imperfect => Self::Open,
         }
     }
 }
@@ -160,7 +188,7 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         // pivots.
         let uncertainty = self.stage.counters.work.uncertainty;
         let mut found = Vec::new();
-        let mut directions = [Direction::default(); 2];
+        let mut directions = [SoFar::default(); 2];
         for number in 0..loads.len() {
             let direction = &mut directions[usize::from(loads[number] < load)];
             if direction.limit != PathLimit::Reached {
@@ -201,17 +229,20 @@ impl Buckling<'_, '_> {
 
     /// The critical load that looks from the start as number `number` of these. The state is then
     /// the start again.
-    fn find(&mut self, loads: &[f64], number: usize, start: &State, others: &Direction) -> Result<Found, Failure> {
+    fn find(&mut self, loads: &[f64], number: usize, start: &State, so_far: &SoFar) -> Result<Found, Failure> {
         let is_back = |load: f64| load < start.load;
         let on_this_side = |load: &&f64| is_back(**load) == is_back(loads[number]);
         // Of the loads on this side of the present one it is number `before`.
         let before = loads[..number].iter().filter(on_this_side).count();
-        let nearest = *loads.iter().find(on_this_side).unwrap_or(&loads[number]);
-        let estimate = Sight { from: start.load, critical: loads[number] };
-        if others.limit == PathLimit::Aside {
-            let seen = self.sights(estimate, nearest, before)?;
+        let aim = Aim {
+            sight: Sight { from: start.load, critical: loads[number] },
+            before,
+            nearest: *loads.iter().find(on_this_side).unwrap_or(&loads[number]),
+        };
+        if so_far.limit == PathLimit::Imperfect {
+            let seen = self.sights(&aim)?;
             self.stage.go_back_to(start)?;
-            return Ok(Found::on_the_way(seen[seen.len() - 1].critical, CriticalKind::Estimate));
+            return Ok(Found::of_the_perfect(seen[seen.len() - 1].critical));
         }
         // The look from the start is as much work as a search.
         let count = loads.len() as f64;
@@ -220,33 +251,32 @@ impl Buckling<'_, '_> {
         self.stage.go_back_to(start)?;
         if found.critical.kind == CriticalKind::Estimate {
             found.critical.load = self.extrapolate(loads[number], before)?.unwrap_or(found.critical.load);
-        } else if let Some(aside) = self.turned_aside(found.critical.load, estimate, nearest, before, others)? {
-            found = aside;
+        } else if let Some(perfect) = self.imperfect(&found, &aim, so_far)? {
+            found = perfect;
         }
         self.stage.go_back_to(start)?;
         Ok(found)
     }
 
-    /// The load at which a structure without a small imperfection buckles, where the path to a critical load turns aside
-    /// on the way: seen from smaller loads it stays where it is, as no limit point does.
-    fn turned_aside(
-        &mut self,
-        found: f64,
-        estimate: Sight,
-        nearest: f64,
-        before: usize,
-        others: &Direction,
-    ) -> Result<Option<Found>, Failure> {
-        // The path has turned aside at a load before, and ends there.
-        let is_again = others.foreseen.is_some_and(|foreseen| is_near(foreseen, found, ASIDE));
-        let is_elsewhere = |sight: &Sight| {
-            let lies_beyond = (found - sight.critical) * (sight.critical - sight.from) > 0.0;
-            !is_near(sight.critical, found, ASIDE) && (lies_beyond || is_again)
-        };
-        if !is_elsewhere(&estimate) || negative_pivots(self.stage).is_none() {
+    /// The load at which a structure without a small imperfection buckles, where the path leads aside and on to a limit
+    /// point: seen from smaller loads it stays where it is, as no limit point does.
+    fn imperfect(&mut self, found: &Found, aim: &Aim, so_far: &SoFar) -> Result<Option<Found>, Failure> {
+        let load = found.critical.load;
+        let is_limit = found.behind == Behind::Ends || found.critical.kind == CriticalKind::Limit;
+        // Contacts that close on the way make the path stiffer.
+        if !is_limit || self.stage.model.contacts().is_some() || so_far.limit.after(found) == PathLimit::Reached {
             return Ok(None);
         }
-        let seen = self.sights(estimate, nearest, before)?;
+        // The path has turned aside at a load before, and ends there.
+        let is_again = so_far.foreseen.is_some_and(|foreseen| is_near(foreseen, load, ELSEWHERE));
+        let is_elsewhere = |sight: &Sight| {
+            let lies_beyond = (load - sight.critical) * (sight.critical - sight.from) > 0.0;
+            !is_near(sight.critical, load, ELSEWHERE) && (lies_beyond || is_again)
+        };
+        if !is_elsewhere(&aim.sight) || negative_pivots(self.stage).is_none() {
+            return Ok(None);
+        }
+        let seen = self.sights(aim)?;
         let [.., last, now] = &seen[..] else { return Ok(None) };
         let drift = now.drift_since(last);
         if !is_elsewhere(now) || drift > NEARLY_STEADY {
@@ -256,22 +286,22 @@ impl Buckling<'_, '_> {
             self.warn_of_turn_aside(now.critical);
             return Ok(None);
         }
-        self.warn_of_imperfection(now.critical, found);
-        Ok(Some(Found::on_the_way(now.critical, CriticalKind::Estimate)))
+        self.warn_of_imperfection(now.critical, load);
+        Ok(Some(Found::of_the_perfect(now.critical)))
     }
 
     /// A critical load as it looks from the start and from points on the way to the nearest one, as far as the path
     /// leads there.
-    fn sights(&mut self, from_start: Sight, nearest: f64, before: usize) -> Result<Vec<Sight>, Failure> {
-        let start = from_start.from;
-        let way = (nearest - start).signum();
-        let mut seen = vec![from_start];
+    fn sights(&mut self, aim: &Aim) -> Result<Vec<Sight>, Failure> {
+        let start = aim.sight.from;
+        let way = (aim.nearest - start).signum();
+        let mut seen = vec![aim.sight];
         for part in PARTS_OF_SIGHTS {
-            let from = start + part * (nearest - start);
+            let from = start + part * (aim.nearest - start);
             if continue_path(self.stage, from)? != Walked::There {
                 break;
             }
-            let Some(critical) = next_critical_load(self.stage, way, before)? else { break };
+            let Some(critical) = next_critical_load(self.stage, way, aim.before)? else { break };
             seen.push(Sight { from, critical });
         }
         Ok(seen)
@@ -298,7 +328,8 @@ impl Buckling<'_, '_> {
                     // A path that goes on has no limit point: an imperfection turns it aside next to a bifurcation.
                     let kind = if goes_on { CriticalKind::Branch } else { self.kind_of_critical(&at_start)? };
                     let ends_path = ended && (goes_on || kind == CriticalKind::Limit);
-                    return Ok(Found { critical: CriticalLoad { load: found, kind }, ends_path });
+                    let behind = if ends_path { Behind::Ends } else { Behind::GoesOn };
+                    return Ok(Found { critical: CriticalLoad { load: found, kind }, behind });
                 }
                 break;
             }
@@ -325,7 +356,10 @@ impl Buckling<'_, '_> {
             }
         }
         self.warn_of_estimate(search.here.load, search.ended);
-        Ok(Found::on_the_way(search.estimate, CriticalKind::Estimate))
+        Ok(match search.ended {
+            Some(Walked::TooCoarse) => Found::on_the_way(search.estimate, CriticalKind::Estimate),
+            None | Some(Walked::There | Walked::Short) => Found::of_the_perfect(search.estimate),
+        })
     }
 
     /// True if the load is no critical one: the tangent next to it does not foresee it, and the search goes on from the
@@ -482,11 +516,11 @@ mod tests {
     use super::*;
 
     /// The loads that are listed of those that searches in one direction come to.
-    fn listed(searches: &[(f64, CriticalKind, bool)]) -> Vec<f64> {
+    fn listed(searches: &[(f64, CriticalKind, Behind)]) -> Vec<f64> {
         let mut direction = PathLimit::Open;
         let mut loads = Vec::new();
-        for &(load, kind, ends_path) in searches {
-            direction = direction.after(&Found { critical: CriticalLoad { load, kind }, ends_path });
+        for &(load, kind, behind) in searches {
+            direction = direction.after(&Found { critical: CriticalLoad { load, kind }, behind });
             if direction == PathLimit::Reached {
                 break;
             }
@@ -497,13 +531,15 @@ mod tests {
 
     #[test]
     fn a_limit_point_that_is_reached_again_ends_the_list() {
-        use CriticalKind::{Branch, Limit};
-        assert_eq!(listed(&[(9.0, Limit, true), (9.0 + 1e-7, Limit, true), (9.0, Limit, true)]), [9.0]);
-        assert_eq!(listed(&[(7.0, Branch, false), (9.0, Limit, true), (9.0, Limit, true)]), [7.0, 9.0]);
+        use Behind::{Ends, GoesOn, Imperfect};
+        use CriticalKind::{Branch, Estimate, Limit};
+        assert_eq!(listed(&[(9.0, Limit, Ends), (9.0 + 1e-7, Limit, Ends), (9.0, Limit, Ends)]), [9.0]);
+        assert_eq!(listed(&[(7.0, Branch, GoesOn), (9.0, Limit, Ends), (9.0, Limit, Ends)]), [7.0, 9.0]);
         // Steep bifurcations pass for limit points.
-        let steep = [(1.03, Limit, true), (1.05, Branch, false), (1.07, Limit, true)];
+        let steep = [(1.03, Limit, Ends), (1.05, Branch, GoesOn), (1.07, Limit, Ends)];
         assert_eq!(listed(&steep), [1.03, 1.05, 1.07]);
-        assert_eq!(listed(&[(1.0, Limit, false), (1.0, Limit, false)]), [1.0, 1.0]);
-        assert_eq!(listed(&[(1.0, Branch, false), (1.0, Branch, false)]), [1.0, 1.0]);
+        assert_eq!(listed(&[(1.0, Limit, GoesOn), (1.0, Limit, GoesOn)]), [1.0, 1.0]);
+        assert_eq!(listed(&[(1.0, Branch, GoesOn), (1.0, Branch, GoesOn)]), [1.0, 1.0]);
+        assert_eq!(listed(&[(1.0, Estimate, Imperfect), (1.0, Estimate, Imperfect)]), [1.0, 1.0]);
     }
 }

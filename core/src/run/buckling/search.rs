@@ -10,6 +10,7 @@ const CLOSED: f64 = 1e-7;
 const SEEN: f64 = 1e-3;
 
 /// An estimate of a critical load from the tangent at another load.
+#[derive(Clone, Copy)]
 pub struct Sight {
     pub(super) from: f64,
     pub(super) critical: f64,

@@ -35,8 +35,6 @@ enum StepOutcome {
     Strayed(Option<Signature>),
     /// Balance, with more friction than energy: perhaps on another branch
     Overdrawn(Option<Signature>),
-    /// Balance, with friction of points that have touched on the way: it counts their way before that
-    TouchedLate(Option<Signature>),
     /// No balance
     Failed(NewtonFailure),
 }
@@ -190,14 +188,13 @@ impl LevelControl<'_, '_> {
             let next = self.next(target);
             self.stage.tell_progress(next)?;
             match self.try_step(next) {
-                StepOutcome::Good(signature) => self.take_step(signature)?,
-                StepOutcome::TouchedLate(_) if self.may_halve_before_touch(next) => {
+                StepOutcome::Good(_) if self.may_halve_before_touch(next) && self.touches_late() => {
                     self.touch = Some(next);
                     self.go_back();
                 }
-                StepOutcome::TouchedLate(signature) => self.take_step(signature)?,
+                StepOutcome::Good(signature) => self.take_step(signature)?,
                 StepOutcome::Failed(NewtonFailure::Interrupted(signal)) => return Err(self.stage.stop(signal)),
-                _ if self.levels.halve(self.stage.soft) => self.go_back(),
+                _ if self.halve(next) => self.go_back(),
                 StepOutcome::Overdrawn(signature) => {
                     self.warn_of_friction();
                     self.take_step(signature)?;
@@ -232,6 +229,14 @@ impl LevelControl<'_, '_> {
     fn may_halve_before_touch(&self, touch: f64) -> bool {
         let longest = LONGEST_STEP_OF_TOUCH * self.levels.level;
         self.levels.approach != Approach::Straight && touch - self.stage.good.load > longest
+    }
+
+    /// Takes the next step half as long as the one to a load factor; `false` where it may not be.
+    fn halve(&mut self, tried: f64) -> bool {
+        if self.touch.is_some() {
+            self.levels.shorten_to(tried - self.stage.good.load);
+        }
+        self.levels.halve(self.stage.soft)
     }
 
     /// Goes back to the last good state, for a shorter step.
@@ -301,9 +306,6 @@ impl LevelControl<'_, '_> {
         if self.friction_account.is_overdrawn(self.stage) {
             return StepOutcome::Overdrawn(signature);
         }
-        if self.touches_late() {
-            return StepOutcome::TouchedLate(signature);
-        }
         let StageRun { model, good, state, newton, soft, contact_change, .. } = &*self.stage;
         let changes = self.stability.changes_to(signature);
         match contact_change {
@@ -326,11 +328,12 @@ impl LevelControl<'_, '_> {
         }
     }
 
-    /// True if points with friction have come into contact on the way to a balanced state.
+    /// True if points with friction have come into contact on the way to a balanced state: their way before
+    /// that counts as sliding.
     fn touches_late(&self) -> bool {
         let StageRun { model, good, state, contact_change, .. } = &*self.stage;
-        let contacts = model.contacts().filter(|contacts| contacts.rubs() && *contact_change != ContactChange::None);
-        contacts.is_some_and(|contacts| contacts.touches_late(good, state))
+        let Some(contacts) = model.contacts() else { return false };
+        contacts.rubs() && *contact_change != ContactChange::None && contacts.touches_late(good, state)
     }
 
     fn take_step(&mut self, signature: Option<Signature>) -> Result<(), Failure> {
@@ -393,6 +396,7 @@ impl LevelControl<'_, '_> {
         self.stage.good.copy_from(self.stage.state);
         self.stability.signature = self.stability.look(self.stage);
         self.levels.restart();
+        self.touch = None;
         self.stage.warn(
             WarningKind::LoadControlResumed,
             format!("load control continues at load factor {target}, after {increments} arc-length increments"),

@@ -85,6 +85,11 @@ impl Levels {
         may
     }
 
+    /// The last step that was tried was no longer than this.
+    pub fn shorten_to(&mut self, tried: f64) {
+        self.increment = self.increment.min(tried);
+    }
+
     /// After a step that was taken.
     pub fn double(&mut self) {
         self.increment = (2.0 * self.increment).min(self.level);

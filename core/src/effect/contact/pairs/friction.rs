@@ -128,7 +128,7 @@ impl PairRole<'_> {
             let [a, b] = self.pairs.both(meeting);
             let [j, k] = point.pair.elements.map(|element| element as usize);
             let length = a.element_length(j).min(b.element_length(k));
-            let limit = law.coefficient * point.state.normal_force.force;
+            let limit = law.limit(point.state.normal_force.force);
             let stiffness = now.stiffness(&point.pair);
             let of_point = self.laws[contact].needed_stick_factor(limit, &stiffness, length, a.radius.min(b.radius));
             needed[contact] = needed[contact].max(of_point);

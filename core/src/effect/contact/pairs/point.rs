@@ -51,11 +51,6 @@ impl PairPoint<'_> {
         self.predecessors.all().map(|number| self.first_known + number)
     }
 
-    /// The limit of friction, without the weight.
-    pub fn friction_limit(&self) -> f64 {
-        self.law.friction.as_ref().map_or(0.0, |law| law.coefficient * self.state.normal_force.force)
-    }
-
     /// The friction on the first beam without the weight (global axes).
     pub fn traction(&self) -> Vec3 {
         self.carrier * self.state.traction.force

@@ -2,7 +2,7 @@
 
 use super::BeamPairs;
 use super::point::{PairPoint, PairsNow, sort};
-use crate::effect::contact::late_touch::LateTouch;
+use crate::effect::contact::late_touch::{LateTouch, PointFriction};
 use crate::effect::contact::laws::{ContactLaws, RELEVANT_FORCE, ROUNDED};
 use crate::effect::contact::strand::ContactStiffness;
 use crate::effect::{ContactChange, ContactResultant, ContactSurvey, Penetration};
@@ -158,15 +158,12 @@ impl<'a> PairRole<'a> {
             return;
         }
         let earlier = PairsNow::new(self.pairs, self.laws, before, &at.contacts.pairs.list);
+        let touched = |meeting: u32| before.contacts.pairs.points.iter().any(|point| point.meeting == meeting);
         self.each(at, &mut |point| {
-            let weight = point.candidate.weight;
             let meeting = point.pair.meeting;
-            let was_apart = || {
-                !earlier.is_among(point, &before.contacts.pairs.points)
-                    && earlier.gap(&point.pair) > self.law_of(meeting).penetration
-            };
-            let contact = self.pairs.contact_of(meeting as usize);
-            out.add(contact, weight * point.traction().norm(), weight * point.friction_limit(), was_apart);
+            let was_apart = || !touched(meeting) && earlier.gap(&point.pair) > self.law_of(meeting).penetration;
+            let friction = PointFriction::of(point.law.friction.as_ref(), &point.state, point.candidate.weight);
+            out.add(self.pairs.contact_of(meeting as usize), friction, was_apart);
         });
     }
 
