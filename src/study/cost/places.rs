@@ -51,7 +51,8 @@ impl Places {
         let stations: Vec<f64> = stations.map(|&(_, along)| along).collect();
         let has_nodes = |count: &usize| kept.iter().all(|spot| is_node(spot, *count, order));
         let ends_there = |count: &usize| stations.iter().all(|&along| is_end(along, *count));
-        (1..=most.max(LARGEST_UNIT))
+        let most_with_stations = if stations.is_empty() { most } else { most.max(LARGEST_UNIT) };
+        (1..=most_with_stations)
             .find(|count| has_nodes(count) && ends_there(count))
             .or_else(|| (1..=most).find(has_nodes))
             .unwrap_or(1)
