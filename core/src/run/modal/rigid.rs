@@ -19,7 +19,7 @@ use crate::effect::{Effect, SomeIncrements};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model};
 use crate::rotation::Rotation;
-use crate::system::{Connectivity, Node, Pattern, State, System};
+use crate::system::{Connectivity, Node, Pattern, Slot, State, System};
 use crate::tensor::Vec3;
 use nalgebra::{DMatrix, SVD};
 use std::collections::BTreeMap;
@@ -80,10 +80,9 @@ pub fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>
 /// forces and stiffness of the state.
 pub fn rigid_motions(assembly: &Assembly, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
     let system = &assembly.system;
-    let parts = groups(&system.pattern, places, &mut |join| {
-        (0..system.pattern.node_blocks.count())
-            .for_each(|column| system.pattern.rows_of(column).iter().for_each(|&row| join(row as usize, column)));
-    });
+    let coupled = (0..system.pattern.node_blocks.count())
+        .flat_map(|column| system.pattern.rows_of(column).iter().map(move |&row| [row as usize, column]));
+    let parts = groups(&system.pattern, places, coupled);
     if parts.len() > MOST_PARTS {
         return Vec::new();
     }
@@ -121,12 +120,11 @@ fn bodies(assembly: &Assembly, model: &Model, part: &[(Node, Vec3)]) -> Vec<Vec<
         .filter(|effect| effect.roles().stresses.is_some())
         .map(|effect| effect.connectivity())
         .collect();
-    groups(pattern, part, &mut |join| {
-        for slots in beams.iter().flat_map(Connectivity::iter) {
-            let blocks = slots.iter().map(|&slot| pattern.node_blocks.of(slot));
-            blocks.clone().zip(blocks.skip(1)).for_each(|(a, b)| join(a, b));
-        }
-    })
+    let of_element = |slots: &[Slot]| {
+        let blocks: Vec<usize> = slots.iter().map(|&slot| pattern.node_blocks.of(slot)).collect();
+        blocks.windows(2).map(|pair| [pair[0], pair[1]]).collect::<Vec<_>>()
+    };
+    groups(pattern, part, beams.iter().flat_map(Connectivity::iter).flat_map(of_element))
 }
 
 /// Forces and stiffness of all effects without the elasticity of beams, which resists no rigid motion, and without the
@@ -140,11 +138,11 @@ fn all_but_beams(assembly: &Assembly, model: &Model, state: &State) -> Assembly 
     others
 }
 
-/// Nodes in groups that are connected; `connect` is given what joins two node blocks.
+/// Nodes in groups that are connected by these pairs of node blocks.
 fn groups(
     pattern: &Pattern,
     places: &[(Node, Vec3)],
-    connect: &mut dyn FnMut(&mut dyn FnMut(usize, usize)),
+    pairs: impl Iterator<Item = [usize; 2]>,
 ) -> Vec<Vec<(Node, Vec3)>> {
     let node_blocks = &pattern.node_blocks;
     let mut group_of: Vec<usize> = (0..node_blocks.count()).collect();
@@ -159,7 +157,7 @@ fn groups(
         let (a, b) = (root(&mut group_of, a), root(&mut group_of, b));
         group_of[a.max(b)] = a.min(b);
     };
-    connect(&mut join);
+    pairs.for_each(|[a, b]| join(a, b));
     // Nodes that share a displacement are one group.
     places.iter().for_each(|(node, _)| join(node_blocks.of(node.u), node_blocks.of(node.p)));
     let mut groups: BTreeMap<usize, Vec<(Node, Vec3)>> = BTreeMap::new();
