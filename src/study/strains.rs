@@ -10,14 +10,14 @@
 //! values at Gauss points, where strains are most accurate.
 
 use super::built::BuiltDeck;
-use crate::deck::{Deck, Division};
+use crate::deck::{Beam, Deck, Division};
 use crate::scene::{Mesh, MeshBeam, Scene};
 use beamsim_core::run::Snapshot;
 use beamsim_core::sorting::sort_numbers;
 use beamsim_core::tensor::Mat3;
 
 /// Tolerance for the place of an element end, in elements.
-const AT_END: f64 = 1e-6;
+pub const AT_END: f64 = 1e-6;
 
 /// The largest number of equal elements that is looked for, with ends at all kept places.
 const MOST_UNITS: usize = 1000;
@@ -115,11 +115,8 @@ fn pieces(deck: &Deck, scene: &Scene) -> Option<Vec<Vec<Piece>>> {
     for (number, (beam, own)) in mesh.beams.iter().zip(&deck.beams).enumerate() {
         let mut kept = kept_places(scene, deck, number);
         // A kink of the section is kept where an element ends there already.
-        if let Some(stations) = &own.stations {
-            let end = stations.value.last().copied().unwrap_or(1.0);
-            let places = stations.value.iter().map(|station| beam.line.locate(station / end));
-            kept.extend(places.filter(|&(piece, t)| is_end(t, own.elements_of(piece).count())));
-        }
+        let ends_there = |&(piece, t): &(usize, f64)| is_end(t, own.elements_of(piece).count());
+        kept.extend(station_places(own, beam).into_iter().filter(ends_there));
         let piece = |k: usize| {
             let inside = |&&(piece, t): &&(usize, f64)| piece == k && t > AT_END && t < 1.0 - AT_END;
             let mut kept: Vec<f64> = kept.iter().filter(inside).map(|&(_, t)| t).collect();
@@ -134,6 +131,13 @@ fn pieces(deck: &Deck, scene: &Scene) -> Option<Vec<Vec<Piece>>> {
         beams.push((0..own.pieces()).map(piece).collect::<Option<Vec<Piece>>>()?);
     }
     Some(beams)
+}
+
+/// The stations of the sections of a beam: the piece of each, and the part of its length.
+pub fn station_places(own: &Beam, meshed: &MeshBeam) -> Vec<(usize, f64)> {
+    let Some(stations) = &own.stations else { return Vec::new() };
+    let end = stations.value.last().copied().unwrap_or(1.0);
+    stations.value.iter().map(|station| meshed.line.locate(station / end)).collect()
 }
 
 /// True if a place is an end of one of `count` equal elements.

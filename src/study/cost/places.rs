@@ -3,9 +3,7 @@
 
 use crate::deck::{Deck, Division};
 use crate::scene::{Scene, Spot};
-
-/// Tolerance for the position of a node, in elements.
-const AT_NODE: f64 = 1e-6;
+use crate::study::strains::{AT_END, is_end, station_places};
 
 /// The largest number of elements of a piece without which its stations are none of their ends.
 const LARGEST_UNIT: usize = 64;
@@ -77,20 +75,12 @@ fn is_node(spot: &Spot, count: usize, order: usize) -> bool {
     }
 }
 
-/// True if one of so many equal parts ends at a place.
-fn is_end(along: f64, parts: usize) -> bool {
-    let x = along * parts as f64;
-    (x - x.round()).abs() < AT_NODE
-}
-
 /// The stations of all beams within pieces of equal elements.
 fn stations(deck: &Deck, scene: &Scene) -> Vec<(Piece, f64)> {
     let mut found = Vec::new();
     for (beam, (own, meshed)) in deck.beams.iter().zip(&scene.mesh.beams).enumerate() {
-        let Some(stations) = &own.stations else { continue };
-        let end = stations.value.last().copied().unwrap_or(1.0);
-        for (number, along) in stations.value.iter().map(|station| meshed.line.locate(station / end)) {
-            let is_inside = along > AT_NODE && along < 1.0 - AT_NODE;
+        for (number, along) in station_places(own, meshed) {
+            let is_inside = along > AT_END && along < 1.0 - AT_END;
             if is_inside && matches!(own.elements_of(number), Division::Equal(_)) {
                 found.push((Piece { beam, number }, along));
             }

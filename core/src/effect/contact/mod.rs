@@ -253,10 +253,10 @@ impl SurfaceContacts {
 
     /// A slot of an element that crosses a box or a mesh, and that no point pushes out.
     fn crossing(&self, number: usize, at: &State) -> Option<Slot> {
-        if !self.is_near(number, at) {
+        let (chain, surface) = (&self.chains[number], &self.surfaces[self.chains[number].surface]);
+        if !surface.surface.has_edges() || !self.is_near(number, at) {
             return None;
         }
-        let (chain, surface) = (&self.chains[number], &self.surfaces[self.chains[number].surface]);
         let crossings = chain.crossings(&surface.surface, &surface.carrier(at, Weights::NONE), at);
         if crossings.is_empty() {
             return None;

@@ -19,7 +19,7 @@ use crate::effect::{Effect, SomeIncrements};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model};
 use crate::rotation::Rotation;
-use crate::system::{Connectivity, Node, Pattern, Slot, State, System};
+use crate::system::{Node, Pattern, State, System};
 use crate::tensor::Vec3;
 use nalgebra::{DMatrix, SVD};
 use std::collections::BTreeMap;
@@ -39,9 +39,12 @@ const LEAST_PART: f64 = 1e-4;
 /// none.
 const LEAST_OF_ALL: f64 = 1e-3;
 
-/// Parts in a scene of more are not looked at, and so are bodies in a part of more: each look goes over all unknowns.
-/// Their rigid motions are found as other slow modes are.
+/// Parts in a scene of more are not looked at: each look goes over all unknowns. Their rigid motions are found as other
+/// slow modes are.
 const MOST_PARTS: usize = 64;
+
+/// The numbers of all rigid motions of the bodies of a part, at most, for which its mechanisms are looked for: 160 MB.
+const MOST_NUMBERS: usize = 20_000_000;
 
 /// Sweeps for the decomposition of six columns, at most.
 const MOST_SWEEPS: usize = 1000;
@@ -97,10 +100,12 @@ pub fn rigid_motions(assembly: &Assembly, model: &Model, state: &State, places: 
         let free = free.and_then(|free| part.unresisted(&fields, free));
         free.map_or(Vec::new(), |free| combine(&fields, &free))
     };
+    let elements = elements_of_beams(assembly, model);
     let of_part = |part: &Vec<(Node, Vec3)>| {
         let as_one = free_motions(&[part]);
-        let bodies = bodies(assembly, model, part);
-        if bodies.len() == 1 || bodies.len() > MOST_PARTS {
+        let bodies = groups(&system.pattern, part, elements.iter().copied());
+        let is_large = MOTIONS * bodies.len() * system.pattern.dof_map.count() > MOST_NUMBERS;
+        if bodies.len() == 1 || is_large {
             return as_one;
         }
         let bodies: Vec<&[(Node, Vec3)]> = bodies.iter().map(|body| &body[..]).collect();
@@ -111,20 +116,16 @@ pub fn rigid_motions(assembly: &Assembly, model: &Model, state: &State, places: 
     parts.iter().flat_map(of_part).collect()
 }
 
-/// The bodies of a part: nodes that beams connect, and single nodes.
-fn bodies(assembly: &Assembly, model: &Model, part: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
-    let pattern = &assembly.system.pattern;
-    let beams: Vec<Connectivity> = model
-        .acting(&assembly.stage)
-        .iter()
-        .filter(|effect| effect.roles().stresses.is_some())
-        .map(|effect| effect.connectivity())
-        .collect();
-    let of_element = |slots: &[Slot]| {
-        let blocks: Vec<usize> = slots.iter().map(|&slot| pattern.node_blocks.of(slot)).collect();
-        blocks.windows(2).map(|pair| [pair[0], pair[1]]).collect::<Vec<_>>()
-    };
-    groups(pattern, part, beams.iter().flat_map(Connectivity::iter).flat_map(of_element))
+/// The pairs of node blocks that elements of beams connect.
+fn elements_of_beams(assembly: &Assembly, model: &Model) -> Vec<[usize; 2]> {
+    let node_blocks = &assembly.system.pattern.node_blocks;
+    let mut pairs = Vec::new();
+    for effect in model.acting(&assembly.stage).iter().filter(|effect| effect.roles().stresses.is_some()) {
+        for slots in effect.connectivity().iter() {
+            pairs.extend(slots.windows(2).map(|pair| [node_blocks.of(pair[0]), node_blocks.of(pair[1])]));
+        }
+    }
+    pairs
 }
 
 /// Forces and stiffness of all effects without the elasticity of beams, which resists no rigid motion, and without the
