@@ -204,7 +204,8 @@ fn nearly_perfect_portals_have_further_loads() {
     for (length, start) in [(1.0, 0.0), (1e3, 1.0), (1e-3, 4.0)] {
         let text = portal(1e6, 0.999, start, 3, length, Vec3([0.0, 0.6, 0.8]));
         let found = critical_loads(&text);
-        assert!(found.len() == 3 && found.iter().all(|found| found.kind == CriticalKind::Estimate), "{found:?}");
+        // An imperfection of 1e-3 is on the verge of changing the load.
+        assert!(found.len() == 3 && found.iter().all(|found| found.kind != CriticalKind::Limit), "{found:?}");
         for (found, perfect) in found.iter().zip(&perfect) {
             let load = found.load * if start > 0.0 { start } else { 1.0 };
             // The mean of the loads is smaller by 5e-4.
@@ -329,4 +330,96 @@ modes = 3
 "#;
     let [found] = critical_loads(text)[..] else { panic!("one load") };
     assert!(found.kind == CriticalKind::Limit && (found.load - 11.84).abs() < 0.02, "{found:?}");
+}
+
+/// A torque about a fixed axis turns what it buckles; its tangent is unsymmetric. Pinned ends: T = 2 pi EI/L, twice, whatever the
+/// stiffness against twisting and the torque that acts already (Greenhill 1883).
+#[test]
+fn shafts_buckle_under_the_torque_that_twists_them() {
+    let mut random = Random::new(117);
+    for _ in 0..12 {
+        let length = 10f64.powf(random.range(-2.0, 2.0));
+        let along = random.direction();
+        let across = along.cross(random.direction()).normalized().unwrap();
+        let aside = along.cross(across);
+        let bending = 10f64.powf(random.range(-2.0, 2.0));
+        let twisting = bending * 10f64.powf(random.range(-0.3, 2.0));
+        let stiff = bending / (length * length) * 10f64.powf(random.range(4.0, 6.0));
+        let critical = 2.0 * std::f64::consts::PI * bending / length;
+        let torque = along * (critical * random.range(0.01, 0.9));
+        let axes = format!("axes = [{}, {}]", list(along), list(across));
+        let text = format!(
+            "[point]\na = [0, 0, 0]\nb = {}\n[section.s]\nEA = {stiff}\nGA = {stiff}\nGJ = {twisting}\nEI = {bending}\n\
+             [[beam]]\nname = \"s\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 6\norder = 3\naxis3 = {}\n\
+             [[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\"]\n{axes}\n[[support]]\nat = \"b\"\nfix = [\"uy\", \"uz\"]\n{axes}\n\
+             [[load]]\nat = \"b\"\nmoment = {}\n[[load]]\nat = \"a\"\nmoment = {}\n[[stage]]\nkind = \"static\"\nsteps = 2\n\
+             [[stage]]\nkind = \"buckling\"\nmodes = 2\n",
+            list(along * length),
+            list(aside),
+            list(torque),
+            list(torque * -1.0),
+        );
+        let found = critical_loads(&text);
+        assert_eq!(found.len(), 2, "{found:?}\n{text}");
+        for found in found {
+            let load = found.load * torque.norm();
+            assert!((load / critical - 1.0).abs() < 2e-3, "{load} for {critical}\n{text}");
+        }
+    }
+}
+
+/// A ring under a pressure that follows it buckles at 3 EI/R^3, twice (Levy 1884). Two arcs of unequal elements bring the two
+/// loads apart, to a pair that is not quite real.
+#[test]
+fn rings_of_unequal_arcs_buckle_under_following_pressure() {
+    let mut random = Random::new(118);
+    for (first, second) in [(20, 24), (40, 57), (31, 30), (25, 25), (80, 97)] {
+        let radius = 10f64.powf(random.range(-2.0, 2.0));
+        let pressure = random.range(0.2, 2.5) / radius.powi(3);
+        let arc = |name: &str, ends: [&str; 2], middle: f64, elements: usize| {
+            format!(
+                "[[beam]]\nname = \"{name}\"\nsection = \"s\"\narc = [\"{}\", [0, {}, 0], \"{}\"]\nelements = {elements}\norder = 1\n\
+                 axis3 = [0, 0, 1]\n[[load]]\nalong = \"{name}\"\nforce = [0, {pressure}, 0]\nframe = \"section\"\n",
+                ends[0],
+                middle * radius,
+                ends[1]
+            )
+        };
+        let stiff = 1e4 / (radius * radius);
+        let text = format!(
+            "[point]\na = [{radius}, 0, 0]\nb = [{}, 0, 0]\n[section.s]\nEA = {stiff}\nGA = {stiff}\nGJ = 100\nEI = [100, 1]\n{}{}\
+             [[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\"]\n[[support]]\nat = \"b\"\nfix = [\"uy\", \"uz\"]\n\
+             [[stage]]\nkind = \"static\"\nsteps = 3\n[[stage]]\nkind = \"buckling\"\nmodes = 2\n",
+            -radius,
+            arc("upper", ["a", "b"], 1.0, first),
+            arc("lower", ["b", "a"], -1.0, second),
+        );
+        let found = critical_loads(&text);
+        assert_eq!(found.len(), 2, "{found:?}\n{text}");
+        for found in found {
+            let load = found.load * pressure * radius.powi(3);
+            // Chords of 20 elements are a little stiffer than the arc.
+            assert!((load / 3.0 - 1.0).abs() < 0.04, "{load} for 3\n{text}");
+        }
+    }
+}
+
+/// A slender tie beside a column buckles where the load turns round, long before the column: the load of the column comes first.
+#[test]
+fn loads_above_the_present_one_are_found_beside_nearer_ones_below() {
+    let mut random = Random::new(119);
+    let text = deck("stability/column_beside_slender_tie.toml");
+    for modes in [1, 2, 4] {
+        for _ in 0..3 {
+            let tie = 10f64.powf(random.range(-2.7, -1.0));
+            let scene = with_modes(&text, modes).replace("1e-3", &tie.to_string());
+            let found = critical_loads(&scene);
+            assert_eq!(found.len(), modes, "{found:?}\n{scene}");
+            let quarter = std::f64::consts::PI.powi(2) / 4.0;
+            let exact = [quarter, 1.2 * quarter, 9.0 * quarter, 10.8 * quarter];
+            for (found, exact) in found.iter().zip(exact) {
+                assert!((found.load / exact - 1.0).abs() < 1e-3, "{tie}: {found:?} for {exact}");
+            }
+        }
+    }
 }

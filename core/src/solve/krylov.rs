@@ -42,6 +42,17 @@ pub struct Spectrum {
     pub(crate) is_complete: bool,
 }
 
+/// The eigenvalues that are looked for first
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum First {
+    /// Those of largest magnitude
+    Largest,
+    /// Those with a positive real part, the largest first, then the others; minor ones are left out
+    Positive,
+    /// The same with a negative real part
+    Negative,
+}
+
 /// Size of the basis of a rough estimate of eigenvalues
 const ROUGH_BASIS_SIZE: usize = 12;
 /// Number of vectors in a block
@@ -67,6 +78,8 @@ const SAME_EIGENVALUE: f64 = 1e-7;
 const BESIDE_EIGENVALUE: f64 = 1e-12;
 /// Inverse iterations for a vector of a multiple eigenvalue
 const INVERSE_ITERATIONS: usize = 3;
+/// Eigenvalues of one sign that are smaller than this part of the largest of all are not looked for.
+const MINOR: f64 = 1e-4;
 /// Vectors that orthogonalisation reduces to this part of their norm are linearly dependent on the
 /// basis.
 const DEPENDENT_NORM_RATIO: f64 = 1e-11;
@@ -75,27 +88,28 @@ const DEPENDENT_NORM_RATIO: f64 = 1e-11;
 /// dimensions. `None` if an image cannot be computed, or after a request to stop.
 pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Spectrum> {
     let most = most_vectors(operator, wanted);
-    let (space, _) = converged_space(operator, wanted, most, &|_| false)?;
+    let (space, _) = converged_space(operator, wanted, most, First::Largest, &|_| false)?;
     space.spectrum(operator.is_symmetric(), wanted)
 }
 
-/// The eigenvalues of largest magnitude, descending, so many of them that `is_enough`, but no more than
-/// `most_wanted`, or than the space has dimensions. `None` if an image cannot be computed, or after a request to
-/// stop.
+/// The eigenvalues of largest magnitude, descending, `first` those of one sign, so many of them that `is_enough`, but no
+/// more than `most_wanted`, or than the space has dimensions. `None` if an image cannot be computed, or after a request
+/// to stop.
 pub fn leading_eigenvalues_until(
     operator: &mut dyn Operator,
     most_wanted: usize,
+    first: First,
     is_enough: &dyn Fn(&[Complex<f64>]) -> bool,
 ) -> Option<Vec<Complex<f64>>> {
     let most = most_vectors(operator, most_wanted);
-    converged_space(operator, most_wanted, most, is_enough).map(|(_, values)| values)
+    converged_space(operator, most_wanted, most, first, is_enough).map(|(_, values)| values)
 }
 
 /// Rough estimates of the eigenvalues of largest magnitude from a few images. `None` if an image
 /// cannot be computed, or after a request to stop.
 pub fn roughly_largest_eigenvalues(operator: &mut dyn Operator) -> Option<Vec<Complex<f64>>> {
     let most = operator.size().min(ROUGH_BASIS_SIZE);
-    let (space, _) = converged_space(operator, most, most, &|_| false)?;
+    let (space, _) = converged_space(operator, most, most, First::Largest, &|_| false)?;
     space.spectrum(operator.is_symmetric(), most).map(|spectrum| spectrum.values)
 }
 
@@ -157,13 +171,14 @@ fn most_vectors(operator: &dyn Operator, wanted: usize) -> usize {
     operator.size().min(24 * wanted + 160)
 }
 
-/// A space of at most `most` vectors in which the `wanted` eigenvalues of largest magnitude have converged, or so
-/// many of them that `is_enough`, and those eigenvalues. `None` if an image cannot be computed, or after a request
+/// A space of at most `most` vectors in which the `wanted` eigenvalues of largest magnitude, `first` those of one sign,
+/// have converged, or so many of them that `is_enough`, and those eigenvalues. `None` if an image cannot be computed, or after a request
 /// to stop.
 fn converged_space(
     operator: &mut dyn Operator,
     wanted: usize,
     most: usize,
+    first: First,
     is_enough: &dyn Fn(&[Complex<f64>]) -> bool,
 ) -> Option<(KrylovSpace, Vec<Complex<f64>>)> {
     let mut space = KrylovSpace::starting(operator, BLOCK_SIZE)?;
@@ -178,7 +193,8 @@ fn converged_space(
             continue;
         }
         look = space.applied() + space.applied() / 4;
-        let mut now = space.eigenvalues(operator.is_symmetric(), guard)?;
+        let mut now = space.eigenvalues(operator.is_symmetric(), first)?;
+        now.truncate(guard);
         let same = |&(a, b): &(&Complex<f64>, &Complex<f64>)| (a - b).norm() <= EIGENVALUE_TOLERANCE * a.norm();
         let converged = now.iter().zip(&last).take_while(same).count();
         let is_all = converged == now.len().max(last.len()) && converged >= wanted.min(operator.size());
@@ -441,14 +457,22 @@ impl KrylovSpace {
         Mat::from_fn(whole.nrows(), whole.ncols(), |i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]))
     }
 
-    /// `None` after a request to stop.
-    fn eigenvalues(&self, is_symmetric: bool, wanted: usize) -> Option<Vec<Complex<f64>>> {
+    /// Eigenvalues of the projection in the order in which they are looked for. `None` after a request to stop.
+    fn eigenvalues(&self, is_symmetric: bool, first: First) -> Option<Vec<Complex<f64>>> {
         let mut values = match is_symmetric {
             true => on_projection(self.symmetric_part(), symmetric_eigenvalues)?,
             false => on_projection(self.projection(), eigenvalues)?,
         };
         sort_by(&mut values, largest_first);
-        values.truncate(wanted);
+        let sign = match first {
+            First::Largest => return Some(values),
+            First::Positive => 1.0,
+            First::Negative => -1.0,
+        };
+        let least = values.first().map_or(0.0, |largest| MINOR * largest.norm());
+        values.retain(|value| value.norm() >= least);
+        let (mut values, others): (Vec<_>, Vec<_>) = values.into_iter().partition(|value| value.re * sign > 0.0);
+        values.extend(others);
         Some(values)
     }
 

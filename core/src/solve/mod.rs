@@ -26,7 +26,7 @@ pub use block::BlockSolver;
 pub use cholesky::{Cholesky, NodeGraph};
 pub use convergence::{Convergence, Judgement, Residual, Verdict, size};
 pub use general::GeneralSolver;
-pub use krylov::{Operator, Spectrum, largest_eigenvalues, leading_eigenvalues_until};
+pub use krylov::{First, Operator, Spectrum, largest_eigenvalues, leading_eigenvalues_until};
 pub use linear::{Factorisation, LinearSolver};
 pub use modes::{MIN_GROWTH_RATIO, Matrices, ModeSearch, ModeShape, Nearest, SmallMotion};
 pub use newton::{Newton, NewtonMemory, contraction};

@@ -102,7 +102,9 @@ impl CriticalSearch {
                 let inside = (before - from) * self.way > 0.0 && (beyond - before) * self.way > 0.0;
                 if inside { before } else { 0.5 * (from + beyond) }
             }
-            _ => target,
+            // Looks a little beyond the middle would not bring both nearer than that.
+            Some(beyond) if (beyond - from).abs() <= 2.0 * CLOSED * beyond.abs() => 0.5 * (from + beyond),
+            Some(_) | None => target,
         }
     }
 

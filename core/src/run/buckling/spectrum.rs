@@ -2,21 +2,26 @@
 //! along the path.
 
 use crate::kernel::Weights;
+use crate::model::SlotKind;
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
 use crate::run::statics::PathDirection;
-use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, leading_eigenvalues_until, mechanism};
+use crate::solve::{First, LinearSolver, Operator, Tangent, is_symmetric, leading_eigenvalues_until, mechanism};
 use crate::sorting::sort_by;
-use crate::system::System;
-use crate::tensor::Vec3;
+use crate::system::{DofMap, Slot, State, System};
+use crate::tensor::{Mat3, Vec3};
 use nalgebra::Complex;
 
 /// How far the state is moved along the path to see the tangent vary: lengths of the scene, and
 /// radians.
 const PROBE: f64 = 1e-5;
-/// Imaginary part up to which a critical load counts as real, relative; double ones come apart a
+/// Imaginary part up to which the distance of a critical load counts as real, relative to it; double ones come apart a
 /// little.
 const REAL: f64 = 1e-3;
+/// The same under unsymmetric tangents, which unequal meshes bring further apart.
+const NEARLY_REAL: f64 = 1e-2;
+/// The same, relative to the critical load: from near by the distance itself is small.
+const NEARLY_REAL_OF_LOAD: f64 = 1e-3;
 
 /// Two critical loads whose distances from the present load differ by less, relative to these, are a pair: those seen
 /// differed by up to 1.5 %, since the tangent itself is not zero between them.
@@ -33,8 +38,8 @@ pub fn negative_pivots(stage: &mut StageRun) -> Option<usize> {
 
 /// The critical loads as they look from the present state: so many, those above it first.
 pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Failure> {
-    let mut loads =
-        nearest_critical_loads(stage, modes, &|ahead| ahead.iter().filter(|&&ahead| ahead > 0.0).count() >= modes)?;
+    let is_enough = |ahead: &[f64]| ahead.iter().filter(|&&ahead| ahead > 0.0).count() >= modes;
+    let mut loads = nearest_critical_loads(stage, modes, First::Positive, &is_enough)?;
     loads.truncate(modes);
     Ok(loads)
 }
@@ -45,7 +50,7 @@ pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Fa
 pub fn unpaired_critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Failure> {
     let load = stage.state.load;
     let is_enough = |ahead: &[f64]| ahead.iter().filter(|&&ahead| ahead > 0.0).count() >= modes;
-    let loads = nearest_critical_loads(stage, modes, &is_enough)?;
+    let loads = nearest_critical_loads(stage, modes, First::Largest, &is_enough)?;
     let is_pair = |a: f64, b: f64| (a + b).abs() < PAIRED * a.abs();
     let is_paired = |critical: f64| loads.iter().any(|other| is_pair(critical - load, other - load));
     Ok(loads.iter().copied().filter(|&critical| !is_paired(critical)).collect())
@@ -56,17 +61,18 @@ pub fn unpaired_critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec
 pub fn next_critical_load(stage: &mut StageRun, way: f64, before: usize) -> Result<Option<f64>, Failure> {
     let load = stage.state.load;
     let lies_there = |ahead: f64| ahead * way > 0.0;
-    let loads = nearest_critical_loads(stage, before + 4, &|ahead| {
-        ahead.iter().filter(|&&ahead| lies_there(ahead)).count() > before
-    })?;
+    let first = if way < 0.0 { First::Negative } else { First::Positive };
+    let is_enough = |ahead: &[f64]| ahead.iter().filter(|&&ahead| lies_there(ahead)).count() > before;
+    let loads = nearest_critical_loads(stage, before + 4, first, &is_enough)?;
     Ok(loads.into_iter().filter(|critical| lies_there(critical - load)).nth(before))
 }
 
 /// The critical loads nearest to the present one, as they look from the present state; those above it come first.
-/// There are so many that `is_enough`, which is given their distances from the present load, or `modes` and some more.
+/// `first` are looked for those on one side. There are so many that `is_enough`, which is given their distances from the present load, or `modes` and some more.
 fn nearest_critical_loads(
     stage: &mut StageRun,
     modes: usize,
+    first: First,
     is_enough: &dyn Fn(&[f64]) -> bool,
 ) -> Result<Vec<f64>, Failure> {
     let Some(PathDirection { rate: direction, .. }) = stage.path_direction()? else { return Ok(Vec::new()) };
@@ -87,24 +93,86 @@ fn nearest_critical_loads(
     }
     // A stable state of a conservative scene: the tangent is an inner product in which everything
     // is symmetric.
-    let stable = newton.solver.negative_pivots(&mut tangent) == Some(0);
+    let negative = newton.solver.negative_pivots(&mut tangent);
+    let stable = negative == Some(0);
     let system = &assembly.system;
     let symmetric = stable && model.multipliers.is_empty();
-    let symmetric = symmetric && is_symmetric(&system.pattern, &varied);
+    let symmetric = symmetric && varied.ends.iter().all(|end| is_symmetric(&system.pattern, &end.values));
     let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
-    let is_real = |theta: &&Complex<f64>| theta.norm() > 0.0 && theta.im.abs() <= REAL * theta.norm();
-    let ahead =
-        |found: &[Complex<f64>]| -> Vec<f64> { found.iter().filter(is_real).map(|theta| 1.0 / theta.re).collect() };
-    let found = leading_eigenvalues_until(&mut operator, 4 * modes + 8, &|found| is_enough(&ahead(found)));
     let load = state.load;
+    let is_real = |distance: &Complex<f64>| {
+        let largest = match negative {
+            Some(_) => REAL * distance.norm(),
+            None => (NEARLY_REAL * distance.norm()).max(NEARLY_REAL_OF_LOAD * (load + distance.re).abs()),
+        };
+        distance.im.abs() <= largest
+    };
+    let ahead = |found: &[Complex<f64>]| -> Vec<f64> {
+        let distances = found.iter().filter(|theta| theta.norm() > 0.0).map(|theta| 1.0 / theta);
+        distances.filter(is_real).map(|distance| distance.re).collect()
+    };
+    let found = leading_eigenvalues_until(&mut operator, 4 * modes + 8, first, &|found| is_enough(&ahead(found)));
     stage.unless_interrupted()?;
     let mut loads: Vec<f64> = ahead(&found.unwrap_or_default()).into_iter().map(|ahead| load + ahead).collect();
     sort_by(&mut loads, |a, b| rank(*a, load).total_cmp(&rank(*b, load)));
     Ok(loads)
 }
 
-/// (K(q + r dq, load + r) - K(q - r dq, load - r)) / 2r
-fn varied_tangent(stage: &mut StageRun, direction: &[Vec3], reach: f64) -> Vec<f64> {
+/// How the tangent varies along the path: (K(q + r dq, load + r) - K(q - r dq, load - r)) / 2r, with the spins of nodes
+/// as unknowns, which are those of the present state there. Rates of rotation vectors are others in each state: where
+/// nodes turn far their tangents vary like that of what is stiff.
+struct VariedTangent {
+    /// Further along the path than the present state, and before it
+    ends: [TangentAtEnd; 2],
+    /// 2r
+    width: f64,
+}
+
+/// The tangent at a state beside the present one.
+struct TangentAtEnd {
+    values: Vec<f64>,
+    /// Equations of rotations that differ from the present ones, with the changes of their unknowns for a spin whose
+    /// unknown has unit changes in the present state
+    spins: Vec<([usize; 3], Mat3)>,
+}
+
+impl TangentAtEnd {
+    fn multiply(&self, system: &System, x: &[f64]) -> Vec<f64> {
+        let mut changes = x.to_vec();
+        self.replace(&mut changes, |spin, x| *spin * x);
+        let mut out = system.multiply(&self.values, &changes);
+        self.replace(&mut out, |spin, x| spin.transpose_mul(x));
+        out
+    }
+
+    fn replace(&self, x: &mut [f64], image: impl Fn(&Mat3, Vec3) -> Vec3) {
+        for (equations, spin) in &self.spins {
+            let turned = image(spin, Vec3(equations.map(|equation| x[equation])));
+            equations.iter().zip(turned.0).for_each(|(&equation, turned)| x[equation] = turned);
+        }
+    }
+}
+
+impl VariedTangent {
+    fn multiply(&self, system: &System, x: &[f64]) -> Vec<f64> {
+        let [after, before] = self.ends.each_ref().map(|end| end.multiply(system, x));
+        after.iter().zip(&before).map(|(after, before)| (after - before) / self.width).collect()
+    }
+}
+
+/// See [`TangentAtEnd::spins`]. Rotations that are held in some direction keep their unknowns.
+fn spins(kinds: &[SlotKind], dof_map: &DofMap, here: &State, there: &State) -> Vec<([usize; 3], Mat3)> {
+    let has_turned = |slot: usize| kinds[slot] == SlotKind::Rotation && here.q[slot] != there.q[slot];
+    let is_free = |slot: &usize| dof_map.of(*slot as Slot).iter().all(|&equation| equation != DofMap::HELD);
+    let of_slot = |slot: usize| {
+        let [from, to] = [here, there].map(|state| state.rotation(slot as Slot));
+        let spin = to.t_inverse() * to.r.transpose() * from.r * from.t;
+        (dof_map.of(slot as Slot).map(|equation| equation as usize), spin)
+    };
+    (0..kinds.len()).filter(|&slot| has_turned(slot)).filter(is_free).map(of_slot).collect()
+}
+
+fn varied_tangent(stage: &mut StageRun, direction: &[Vec3], reach: f64) -> VariedTangent {
     let StageRun { assembly, model, state: here, schedule, .. } = stage;
     assembly.forget();
     let mut tangent = |reach: f64| {
@@ -113,10 +181,10 @@ fn varied_tangent(stage: &mut StageRun, direction: &[Vec3], reach: f64) -> Vec<f
         state.q.copy_from_slice(&here.q);
         state.q.iter_mut().zip(direction).for_each(|(q, &d)| *q += d * reach);
         assembly.evaluate(&state, Weights::STIFFNESS, None);
-        assembly.system.values.clone()
+        let spins = spins(&model.kinds, &assembly.system.pattern.dof_map, here, &state);
+        TangentAtEnd { values: assembly.system.values.clone(), spins }
     };
-    let (after, before) = (tangent(reach), tangent(-reach));
-    after.iter().zip(&before).map(|(a, b)| (a - b) / (2.0 * reach)).collect()
+    VariedTangent { ends: [tangent(reach), tangent(-reach)], width: 2.0 * reach }
 }
 
 /// Loads above the present one come first, nearest first, then the others.
@@ -128,7 +196,7 @@ pub fn rank(critical: f64, load: f64) -> f64 {
 /// K^-1 K': its eigenvalues are -1/m.
 struct Softening<'a> {
     system: &'a System,
-    varied: &'a [f64],
+    varied: &'a VariedTangent,
     solver: &'a mut LinearSolver,
     symmetric: bool,
 }
@@ -139,7 +207,7 @@ impl Operator for Softening<'_> {
     }
 
     fn apply(&mut self, x: &[f64], _weighed: &[f64]) -> Option<Vec<f64>> {
-        let mut out = self.system.multiply(self.varied, x);
+        let mut out = self.varied.multiply(self.system, x);
         out.iter_mut().for_each(|v| *v = -*v);
         self.solver.solve_for_modes(self.system, &mut out).then_some(out)
     }
