@@ -58,9 +58,17 @@ pub trait Contacts {
     /// Lists the pairs of beam elements that are near each other, unless a state has such a list.
     fn list_pairs(&self, at: &mut State);
 
-    /// Adds to the list of `from` the pairs of beam elements that may have met on the way to another
-    /// state without being listed.
-    fn list_missed(&self, from: &mut State, to: &State) -> MissedPairs;
+    /// Adds to what is looked at in `from` what may have met on the way to another state without being looked at:
+    /// pairs of beam elements, beams and surfaces. If there is none, puts aside in `to` what is far from its surface:
+    /// the next step does not look at it, and must ask this at its end.
+    fn list_missed(&self, from: &mut State, to: &mut State) -> Missed;
+
+    /// Looks again in `from` at what is put aside there and may meet its surface on the way to the end of a failed
+    /// step; true if there is some.
+    fn look_for(&self, from: &mut State, to: &State) -> bool;
+
+    /// Looks again at all that is put aside in an accepted state.
+    fn look_everywhere(&self, at: &mut State);
 
     /// The part of an increment of the unknowns, up to 1, on which the centre lines of beams stay
     /// apart.
@@ -92,14 +100,14 @@ pub trait Contacts {
     fn force_along(&self, beam: usize, fraction: f64, at: &State) -> [f64; 2];
 }
 
-/// The outcome of a look for pairs of beam elements that a step did not see.
+/// The outcome of a look for contacts that a step did not look at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MissedPairs {
+pub enum Missed {
     /// None are missing: the step holds.
     None,
-    /// Some were missing, and are listed now: the step is to be taken again.
+    /// Some were missing, and are looked at now: the step is to be taken again.
     Listed(Slot),
-    /// More are missing than can be listed: the step is too long.
+    /// More pairs of beam elements are missing than can be listed: the step is too long.
     TooMany(Slot),
 }
 

@@ -19,9 +19,7 @@ pub mod spring;
 mod volume;
 
 pub use batch::{ByOrder, Connection};
-pub use contact_role::{
-    ContactChange, ContactResultant, ContactSurvey, Contacts, ElasticStick, MissedPairs, Penetration,
-};
+pub use contact_role::{ContactChange, ContactResultant, ContactSurvey, Contacts, ElasticStick, Missed, Penetration};
 pub use volume::{VolumeElement, VolumeElements};
 
 use crate::kernel::Weights;

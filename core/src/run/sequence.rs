@@ -93,6 +93,9 @@ impl<'o> Run<'o> {
         if let Some(error) = lacking(&self.model, &self.run.schedule, stage, number, fading, || Some(dof_map.clone())) {
             return Err(describe(error, &self.model, number));
         }
+        if let Some(contacts) = self.model.contacts() {
+            contacts.look_everywhere(&mut self.run.state);
+        }
         let mut run = self.stage_run(number, dof_map, fresh)?;
         run.warn_of_space();
         Ok(run)

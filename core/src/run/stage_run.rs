@@ -10,7 +10,7 @@ use super::observer::Observer;
 use super::plan::{Plan, Stage};
 use super::results::StageResult;
 use super::snapshot::{Counters, Snapshot};
-use crate::effect::{ContactChange, MissedPairs, Penetration};
+use crate::effect::{ContactChange, Contacts, Missed, Penetration};
 use crate::interrupt;
 use crate::model::{Assembly, Charted, Model, Motion, Schedule, StageError, Timeline, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure};
@@ -389,22 +389,23 @@ impl StageRun<'_> {
         }
     }
 
-    /// Pairs of beams that were not looked at may have met between the last good state and this one:
+    /// Beams and surfaces that were not looked at may have met between the last good state and this one:
     /// with them the step is taken again.
     pub fn refuse_missed(&mut self) -> Result<(), NewtonFailure> {
         let Some(contacts) = self.model.contacts() else { return Ok(()) };
         match contacts.list_missed(self.good, self.state) {
-            MissedPairs::None => Ok(()),
-            MissedPairs::Listed(slot) | MissedPairs::TooMany(slot) => {
-                Err(NewtonFailure::Passes { slot: slot as usize })
-            }
+            Missed::None => Ok(()),
+            Missed::Listed(slot) | Missed::TooMany(slot) => Err(NewtonFailure::Passes { slot: slot as usize }),
         }
     }
 
-    /// Goes back to the last good state. True if more pairs of beams are listed there now, with
-    /// which the step may succeed.
+    /// After a failed step: goes back to the last good state. True if more pairs of beams are listed there now, or
+    /// more surfaces looked at, with which the step may succeed.
     pub fn looks_at_more(&mut self) -> bool {
-        if self.assembly.fits(self.good) {
+        let has_more =
+            !self.assembly.fits(self.good) || self.good.contacts.clearances != self.state.contacts.clearances;
+        let finds_more = |contacts: &dyn Contacts| contacts.look_for(self.good, self.state);
+        if !has_more && !self.model.contacts().is_some_and(finds_more) {
             return false;
         }
         self.state.copy_from(self.good);

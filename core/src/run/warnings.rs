@@ -109,9 +109,6 @@ impl StageRun<'_> {
     /// such points are failures.
     pub fn warn_of_hidden_penetration(&mut self) {
         let Some(contacts) = self.model.contacts() else { return };
-        if contacts.penetrates(self.state, &|_| true).is_some() {
-            return;
-        }
         let Some(Penetration { contact, surface, depth, .. }) = contacts.hidden_penetration(self.state) else { return };
         let stage = self.number + 1;
         let message = format!(

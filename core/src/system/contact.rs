@@ -51,6 +51,9 @@ pub struct ContactMemory {
     pub(crate) is_clear: bool,
     /// Contacts of each chain: a beam or a body against a surface
     pub(crate) chains: Arc<Vec<ChainMemory>>,
+    /// Chains that cannot touch their surfaces before the next step ends: they are not looked at; empty where
+    /// all are
+    pub(crate) clearances: Arc<Vec<Option<Clearance>>>,
     /// Pairs of beam elements, and their contacts
     pub pairs: PairsMemory,
 }
@@ -73,6 +76,7 @@ impl Default for ContactMemory {
             shortest: None,
             is_clear: false,
             chains: Arc::default(),
+            clearances: Arc::default(),
             pairs: PairsMemory::default(),
         }
     }
@@ -84,11 +88,44 @@ impl ContactMemory {
         self.full_stick_factors.get(contact).copied().unwrap_or(1.0)
     }
 
+    /// How far a chain is from its surface, if it is not looked at.
+    pub fn clearance(&self, chain: usize) -> Option<&Clearance> {
+        self.clearances.get(chain)?.as_ref()
+    }
+
+    /// True if a chain has points in memory.
+    pub fn has_points(&self, chain: usize) -> bool {
+        self.chains.get(chain).is_some_and(|memory| !memory.points.is_empty())
+    }
+
     /// True if some point has a force.
     pub fn touches(&self) -> bool {
         let has_force = |point: &PointMemory| point.force > 0.0;
         let of_pairs = self.pairs.points.iter().any(|point| has_force(&point.point));
         of_pairs || self.chains.iter().flat_map(|chain| &chain.points).any(has_force)
+    }
+}
+
+/// A ball that holds a beam or a body, and its place beside a surface that it does not touch.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Clearance {
+    /// The centre of the ball (axes of the surface)
+    pub(crate) middle: Vec3,
+    /// The radius of the ball, a length
+    pub(crate) reach: f64,
+    /// The distance of its centre from the surface, a length
+    pub(crate) gap: f64,
+}
+
+impl Clearance {
+    /// True if the ball does not meet the surface on the straight way to another place, either of the two lengthened
+    /// by `more`. The distance changes by no more than the centre moves, and the radius grows linearly.
+    pub fn lasts_until(&self, end: &Self, more: f64) -> bool {
+        let way = (end.middle - self.middle).norm() + more;
+        let growth = end.reach - self.reach;
+        // The part of the way that is free as seen from one of its ends.
+        let free = |clear: f64, closing: f64| if closing > 0.0 { clear / closing } else { 1.0 };
+        free(self.gap - self.reach, way + growth) + free(end.gap - end.reach, way - growth) > 1.0
     }
 }
 

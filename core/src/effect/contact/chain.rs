@@ -15,7 +15,7 @@ use super::surface::SceneSurface;
 use crate::kernel::MAX_NODES;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
-use crate::system::{ChainMemory, ContactRegime, PointMemory, State};
+use crate::system::{ChainMemory, Clearance, ContactRegime, PointMemory, State};
 use crate::tensor::Vec3;
 use std::ops::Deref;
 
@@ -180,15 +180,25 @@ impl Chain {
         SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points, regime }.candidates()
     }
 
-    /// True if the surface is farther from the middle node than the chain reaches: no point of it has
-    /// a force. Most scenes ask this most of the time.
-    pub(super) fn is_far(&self, surface: &SceneSurface, at: &State) -> bool {
+    /// The ball around the middle node that holds the chain; `None` if it meets the surface. Without it
+    /// no point of the chain has a force.
+    pub(super) fn clearance(&self, surface: &SceneSurface, at: &State) -> Option<Clearance> {
         let place = |node: &ChainNode| node.place + at.q[node.node.u as usize];
-        let middle = place(&self.nodes[self.nodes.len() / 2]);
-        let Some(distance) = surface.distance(middle, at) else { return false };
-        let gap = distance - self.radius * (1.0 + MARGIN);
-        let reach = gap / REACH[self.order + 1];
-        gap > 0.0 && self.nodes.iter().all(|node| (place(node) - middle).squared() < reach * reach)
+        let centre = place(&self.nodes[self.nodes.len() / 2]);
+        let middle = surface.on_surface(centre, at);
+        let gap = surface.surface.distance(middle).ok()?.value - self.radius * (1.0 + MARGIN);
+        let factor = REACH[self.order + 1];
+        let limit = (gap / factor).powi(2);
+        let mut farthest = 0.0f64;
+        for node in &self.nodes {
+            let squared = (place(node) - centre).squared();
+            let is_inside = squared < limit;
+            if !is_inside {
+                return None;
+            }
+            farthest = farthest.max(squared);
+        }
+        (gap > 0.0).then_some(Clearance { middle, reach: factor * farthest.sqrt(), gap })
     }
 
     /// The points in memory that each candidate was.

@@ -4,6 +4,7 @@
 //! them the multipliers and tractions of the memory in the state, and writes that memory when a
 //! state is accepted.
 
+mod aside;
 mod chain;
 mod chain_now;
 mod late_touch;
@@ -24,7 +25,7 @@ pub use strand::{ChainNode, ContactStiffness, Strand};
 pub use surface::{SceneSurface, SurfaceCarrier};
 
 use super::{
-    ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, ElasticStick, MissedPairs,
+    ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, ElasticStick, Missed,
     Penetration, Roles, TangentForm,
 };
 use crate::kernel::Weights;
@@ -76,9 +77,9 @@ impl SurfaceContacts {
     /// True if a chain may touch its surface in a state, or touched it before, and its contact acts.
     fn is_near(&self, number: usize, at: &State) -> bool {
         let chain = &self.chains[number];
-        let touched = at.contacts.chains.get(number).is_some_and(|memory| !memory.points.is_empty());
-        at.amplitude[self.laws[chain.contact].amplitude] != 0.0
-            && (touched || !chain.is_far(&self.surfaces[chain.surface], at))
+        at.contacts.clearance(number).is_none()
+            && at.amplitude[self.laws[chain.contact].amplitude] != 0.0
+            && (at.contacts.has_points(number) || chain.clearance(&self.surfaces[chain.surface], at).is_none())
     }
 
     /// Visits the chains that may touch their surfaces in a state, or touched them before.
@@ -109,11 +110,13 @@ impl SurfaceContacts {
     }
 
     /// True if no chain touches, or touched, and none has friction, which follows nodes that do not
-    /// touch: there is nothing to remember.
+    /// touch, unless it is put aside: there is nothing to remember.
     fn is_clear(&self, at: &State) -> bool {
-        let is_clear =
-            |chain: &Chain| !self.laws[chain.contact].rubs() && chain.is_far(&self.surfaces[chain.surface], at);
-        self.pairs.is_empty() && !at.contacts.touches() && self.chains.iter().all(is_clear)
+        let is_far = |chain: &Chain| {
+            !self.laws[chain.contact].rubs() && chain.clearance(&self.surfaces[chain.surface], at).is_some()
+        };
+        let is_clear = |number: usize| at.contacts.clearance(number).is_some() || is_far(&self.chains[number]);
+        self.pairs.is_empty() && !at.contacts.touches() && (0..self.chains.len()).all(is_clear)
     }
 
     /// Writes a new memory of all contacts.
@@ -122,7 +125,7 @@ impl SurfaceContacts {
         for (number, chain) in self.chains.iter().enumerate() {
             let old = at.contacts.chains.get(number);
             let new = &mut chains[number];
-            if accepts && self.laws[chain.contact].rubs() {
+            if accepts && self.laws[chain.contact].rubs() && at.contacts.clearance(number).is_none() {
                 let carrier = self.surfaces[chain.surface].carrier(at, Weights::NONE);
                 new.nodes = chain.nodes.iter().map(|node| before_of(node, &carrier, at)).collect();
             } else if let Some(old) = old {
@@ -442,8 +445,21 @@ impl Contacts for SurfaceContacts {
         }
     }
 
-    fn list_missed(&self, from: &mut State, to: &State) -> MissedPairs {
-        if self.pairs.is_empty() { MissedPairs::None } else { self.pairs.add_missed(from, to) }
+    fn list_missed(&self, from: &mut State, to: &mut State) -> Missed {
+        let of_pairs = if self.pairs.is_empty() { Missed::None } else { self.pairs.add_missed(from, to) };
+        match of_pairs {
+            Missed::TooMany(_) | Missed::Listed(_) => of_pairs,
+            Missed::None => self.put_aside(from, to),
+        }
+    }
+
+    fn look_for(&self, from: &mut State, to: &State) -> bool {
+        let clearances = self.clearances(to);
+        self.look_for_missed(from, to, &clearances).is_some()
+    }
+
+    fn look_everywhere(&self, at: &mut State) {
+        self.look_at_all(at);
     }
 
     fn safe_part(&self, at: &State, increment: &[Vec3]) -> f64 {
@@ -549,7 +565,7 @@ impl Contacts for SurfaceContacts {
                 return;
             }
             // A point of a contact that goes on has come along the beam.
-            let touched = before.contacts.chains.get(number).is_some_and(|memory| !memory.points.is_empty());
+            let touched = before.contacts.has_points(number);
             chain.each_point(Weights::NONE, &mut |point, _| {
                 let was_apart = || !touched && chain.gap_in(point.candidate, before) > chain.laws.penetration;
                 let friction = PointFriction::of(point.law.friction.as_ref(), &point.state, point.candidate.weight);
@@ -628,20 +644,22 @@ impl Contacts for SurfaceContacts {
             if angle <= LARGEST_TURN_IN_FRICTION || !self.is_near(number, at) {
                 return None;
             }
-            let touches = at.contacts.chains.get(number).is_some_and(|memory| !memory.points.is_empty());
-            let rubs = touches && self.laws[chain.contact].rubs();
+            let rubs = at.contacts.has_points(number) && self.laws[chain.contact].rubs();
             (rubs || angle > LARGEST_TURN_NEARBY).then_some((surface.name.as_str(), angle))
         };
         (0..self.chains.len()).find_map(too_far)
     }
 
     fn passed(&self, from: &State, to: &State) -> Option<Slot> {
-        let of_chain = |(chain, _, surface): (&Chain, &ContactLaws, &SceneSurface)| {
-            passing::passed(chain, surface, from, to).map(|node| chain.nodes[node].node.u)
+        let looked_at = || (0..self.chains.len()).filter(|&number| to.contacts.clearance(number).is_none());
+        let of_chain = |number: usize| {
+            let chain = &self.chains[number];
+            let acts = to.amplitude[self.laws[chain.contact].amplitude] != 0.0;
+            let node = passing::passed(chain, &self.surfaces[chain.surface], from, to).filter(|_| acts)?;
+            Some(chain.nodes[node].node.u)
         };
-        let crossing = |number: usize| self.crossing(number, to);
-        let of_surfaces = self.acting(to).find_map(of_chain).or_else(|| self.strayed(from, to));
-        let of_surfaces = of_surfaces.or_else(|| (0..self.chains.len()).find_map(crossing));
+        let of_surfaces = looked_at().find_map(of_chain).or_else(|| self.strayed(from, to));
+        let of_surfaces = of_surfaces.or_else(|| looked_at().find_map(|number| self.crossing(number, to)));
         of_surfaces.or_else(|| self.pairs().turned_over(to)).or_else(|| self.pairs().passed(from, to))
     }
 

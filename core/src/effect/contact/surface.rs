@@ -76,16 +76,27 @@ impl SceneSurface {
         }
     }
 
-    /// The distance of a place (global components); `None` where the surface has no normal.
-    pub(super) fn distance(&self, place: Vec3, at: &State) -> Option<f64> {
-        let place = match self.carrier {
+    /// The angle of a prescribed rotation between two states times the farther of two distances from its axis: how far
+    /// the way of a place is from its chord, at most.
+    pub(super) fn arc_beside_chord(&self, ends: [Vec3; 2], from: &State, to: &State) -> f64 {
+        match self.carrier {
+            SurfaceCarrier::Turn { about, axis, .. } => {
+                let lever = ends.map(|end| axis.cross(end - about).norm());
+                self.turned(&from.amplitude, &to.amplitude) * lever[0].max(lever[1])
+            }
+            SurfaceCarrier::Ground | SurfaceCarrier::Node { .. } | SurfaceCarrier::Shift { .. } => 0.0,
+        }
+    }
+
+    /// A place (global components) in the axes of the surface.
+    pub(super) fn on_surface(&self, place: Vec3, at: &State) -> Vec3 {
+        match self.carrier {
             SurfaceCarrier::Ground => place,
             SurfaceCarrier::Shift { direction, amplitude } => place - direction * at.amplitude[amplitude],
             SurfaceCarrier::Node { .. } | SurfaceCarrier::Turn { .. } => {
                 self.carrier(at, Weights::NONE).on_surface(place)
             }
-        };
-        self.surface.distance(place).ok().map(|distance| distance.value)
+        }
     }
 
     /// Its rotation and its shift in a state: a point y of the surface is at R y + d.

@@ -107,7 +107,7 @@ impl StageRun<'_> {
             contacts.stick_part = attempts.softened_stick;
             (contacts.goes_on, contacts.resists) = (attempts.goes_on, attempts.resists);
             let attempt = self.attempt_once(load).and_then(|()| self.augment());
-            let attempt = attempt.and_then(|()| self.refuse_far_steps()).and_then(|()| self.refuse_missed());
+            let attempt = attempt.and_then(|()| self.refuse_missed());
             (self.state.contacts.goes_on, self.state.contacts.resists) = (true, false);
             let failure = match attempt {
                 // A part that has left all that held it has come to no balance of its own.
@@ -211,6 +211,7 @@ impl StageRun<'_> {
         let mut augmentations = 0;
         let mut before = 0.0;
         let mut growth = GROWTH;
+        let mut is_solved_again = false;
         loop {
             let penetrates = survey.violation > 1.0;
             if !penetrates {
@@ -227,11 +228,15 @@ impl StageRun<'_> {
             let next =
                 Stiffening { penetrates, raises: penetrates && survey.violation * GROWTH > before, sticks_softly };
             self.solve_firmer(next, &mut growth)?;
+            is_solved_again = true;
             if penetrates {
                 before = survey.violation;
                 augmentations += 1;
             }
             survey = contacts.survey(self.state);
+        }
+        if is_solved_again {
+            self.refuse_far_steps()?;
         }
         self.end_augmentations(first, contraction, augmentations)
     }

@@ -109,7 +109,10 @@ impl Path {
 
     /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to
     /// go on in.
-    fn with_measure(stage: &StageRun, rate: Vec<Vec3>) -> Self {
+    fn with_measure(stage: &mut StageRun, rate: Vec<Vec3>) -> Self {
+        if let Some(contacts) = stage.model.contacts() {
+            contacts.look_everywhere(stage.state);
+        }
         let moved = squared(stage, &rate);
         let rotated = stage.model.kinds.iter().zip(&rate).filter(|(kind, _)| **kind == SlotKind::Rotation);
         let turned = rotated.map(|(_, d)| d.norm() * stage.model.length).fold(0.0, f64::max);

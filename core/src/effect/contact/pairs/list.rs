@@ -7,7 +7,7 @@
 
 use super::point::PairsNow;
 use super::{BeamPairs, ElementOf, PairRole, Strand};
-use crate::effect::MissedPairs;
+use crate::effect::Missed;
 use crate::effect::contact::chain::REACH;
 use crate::kernel::contact::grid::{Ball, overlapping};
 use crate::kernel::contact::pair_search::{Segments, safe_part};
@@ -70,11 +70,11 @@ impl BeamPairs {
 
     /// Adds to the list of `from` the pairs that may have met on the way to another state without
     /// being listed.
-    pub(in crate::effect::contact) fn add_missed(&self, from: &mut State, to: &State) -> MissedPairs {
+    pub(in crate::effect::contact) fn add_missed(&self, from: &mut State, to: &State) -> Missed {
         let [before, after] = [&*from, to].map(|at| self.places(at));
         let memory = &mut from.contacts.pairs;
         if farthest(&after, &memory.places) <= 0.5 * memory.margin {
-            return MissedPairs::None;
+            return Missed::None;
         }
         let mut missed = Vec::new();
         self.each_near(&self.swept(&before, &after), &mut |pair| {
@@ -82,17 +82,17 @@ impl BeamPairs {
                 missed.push(pair);
             }
         });
-        let Some(first) = missed.first() else { return MissedPairs::None };
+        let Some(first) = missed.first() else { return Missed::None };
         let slot = self.nodes_of(first)[0][0].node.u;
         if missed.len() > MOST_MISSED * self.first_elements.last().copied().unwrap_or_default() {
-            return MissedPairs::TooMany(slot);
+            return Missed::TooMany(slot);
         }
         let mut list = (*memory.list).clone();
         list.extend(missed);
         list.sort_unstable();
         memory.directions = Arc::new(self.directions_of(&list, &before));
         memory.list = Arc::new(list);
-        MissedPairs::Listed(slot)
+        Missed::Listed(slot)
     }
 
     /// Directions at all nodes; none where no pair is listed.

@@ -1,0 +1,87 @@
+//! Beams and bodies too far from a surface to touch it in the next step.
+//!
+//! They are put aside when a step ends, and not looked at in the next one. When that has ended its whole way
+//! is: where it may have come near the surface the step is taken again with a look at it.
+
+use super::chain_now::before_of;
+use super::{Missed, SurfaceContacts};
+use crate::kernel::Weights;
+use crate::system::{Clearance, State};
+use std::sync::Arc;
+
+impl SurfaceContacts {
+    /// The clearance of a chain whose contact acts and that touches nothing.
+    fn clearance(&self, number: usize, at: &State) -> Option<Clearance> {
+        let chain = &self.chains[number];
+        if at.amplitude[self.laws[chain.contact].amplitude] == 0.0 || at.contacts.has_points(number) {
+            return None;
+        }
+        chain.clearance(&self.surfaces[chain.surface], at)
+    }
+
+    /// True if a chain keeps its clearance on the way between two states.
+    fn lasts(&self, number: usize, ends: [&Clearance; 2], from: &State, to: &State) -> bool {
+        let surface = &self.surfaces[self.chains[number].surface];
+        let arc = surface.arc_beside_chord(ends.map(|end| end.middle), from, to);
+        ends[0].lasts_until(ends[1], arc)
+    }
+
+    /// Puts aside in `to`, where a step has ended, what is far from its surface. Looks again in `from`, where it
+    /// began, at what was put aside there and may have come near: the step is to be taken again.
+    pub(super) fn put_aside(&self, from: &mut State, to: &mut State) -> Missed {
+        let clearances = self.clearances(to);
+        match self.look_for_missed(from, to, &clearances) {
+            Some(first) => Missed::Listed(self.chains[first].nodes[0].node.u),
+            None => {
+                to.contacts.clearances = Arc::new(clearances);
+                Missed::None
+            }
+        }
+    }
+
+    /// The clearances of all chains in a state.
+    pub(super) fn clearances(&self, at: &State) -> Vec<Option<Clearance>> {
+        (0..self.chains.len()).map(|number| self.clearance(number, at)).collect()
+    }
+
+    /// Looks again in `from` at what is put aside there and may have come near to its surface on the way to a state
+    /// with other clearances; the number of the first such chain.
+    pub(super) fn look_for_missed(&self, from: &mut State, to: &State, after: &[Option<Clearance>]) -> Option<usize> {
+        let came_near = |number: &usize| match (from.contacts.clearance(*number), &after[*number]) {
+            (None, _) => false,
+            (Some(_), None) => true,
+            (Some(before), Some(after)) => !self.lasts(*number, [before, after], from, to),
+        };
+        let near: Vec<usize> = (0..after.len()).filter(came_near).collect();
+        if !near.is_empty() {
+            self.look_at(&near, from);
+        }
+        near.first().copied()
+    }
+
+    /// Looks again at all chains that were put aside in an accepted state.
+    pub(super) fn look_at_all(&self, at: &mut State) {
+        let aside = |number: &usize| at.contacts.clearance(*number).is_some();
+        let numbers: Vec<usize> = (0..self.chains.len()).filter(aside).collect();
+        self.look_at(&numbers, at);
+        at.contacts.clearances = Arc::default();
+    }
+
+    /// Looks again at some chains that were put aside in an accepted state.
+    fn look_at(&self, numbers: &[usize], at: &mut State) {
+        let mut clearances = (*at.contacts.clearances).clone();
+        let mut chains = (*at.contacts.chains).clone();
+        chains.resize_with(self.chains.len(), Default::default);
+        for &number in numbers {
+            clearances[number] = None;
+            let chain = &self.chains[number];
+            // Friction has not followed the nodes of what was put aside.
+            if self.laws[chain.contact].rubs() {
+                let carrier = self.surfaces[chain.surface].carrier(at, Weights::NONE);
+                chains[number].nodes = chain.nodes.iter().map(|node| before_of(node, &carrier, at)).collect();
+            }
+        }
+        at.contacts.clearances = Arc::new(clearances);
+        at.contacts.chains = Arc::new(chains);
+    }
+}
