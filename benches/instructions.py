@@ -7,7 +7,8 @@ Each scene is a chain of 60 elements, run over few and over many steps; the diff
 costs in an iteration, without the start of the program. The allocator's own instructions are left out: how long it searches its lists
 depends on the lengths of paths and of the deck, by up to 1 % of a run. It may exceed what benches/instructions.csv holds by 5 %
 (compilers differ); `--bless` records new numbers. Scenes that differ only by tables without effect must cost the same to 0.1 %, copies left
-out, too: what is absent costs nothing. Where valgrind is not installed, that is said, and nothing fails.
+out, too: what is absent costs nothing; contacts out of reach may cost 1 %. Where valgrind is not installed, that is said, and nothing
+fails.
 Exit status: 0 fine or skipped, 1 something costs more than it should, 2 a run failed.
 """
 
@@ -30,8 +31,8 @@ ELEMENTS = 60
 # Steps of the short and of the long run, and of the long one where costs are compared to 0.1 %: a run's own instructions vary by some
 # 1,600, mostly with the digits of the seconds that it writes, which is 0.1 % of eight steps.
 FEW, MANY, MANY_TO_COMPARE = 2, 8, 32
-# A compiler's whims, and scenes that must cost the same.
-TOLERANCE, SAME = 0.05, 1e-3
+# A compiler's whims, scenes that must cost the same, and contacts out of reach.
+TOLERANCE, SAME, NEARLY_SAME = 0.05, 1e-3, 1e-2
 # Instructions of a function in callgrind_annotate's list, and the functions of the allocator.
 LISTED = re.compile(r"^\s*([\d,]+) \(\s*[\d.]+%\)\s+\S*?:(.*)$", re.MULTILINE)
 ALLOCATOR = re.compile(r"malloc|calloc|realloc|memalign|_int_free|free\b|unlink_chunk|alloc_perturb|systrim|tcache|morecore")
@@ -97,6 +98,17 @@ SCENES = {
     "dynamic, rotary inertia": scene(**ROTARY),
     "dynamic, mass damping": scene(**ROTARY, tables="[damping]\nmass = 0.1\n"),
     "dynamic, strain-rate damping": scene(**ROTARY, tables="[damping]\nstiffness = 1e-3\n"),
+}
+# Surfaces that nothing can reach.
+FAR_PLANE = '[[surface]]\nname = "floor"\nkind = "plane"\npoint = [0, 0, -50]\nnormal = [0, 0, 1]\n'
+FAR_SPHERE = '[[surface]]\nname = "floor"\nkind = "sphere"\nat = [5, 0, -50]\nradius = 3\n'
+CONTACT = '[[contact]]\nname = "c"\nbeams = ["b"]\nsurfaces = ["floor"]\nradius = 0.01\n'
+# Pairs that must cost nearly the same.
+FAR = {
+    "plane, static": (scene(), scene(tables=FAR_PLANE + CONTACT)),
+    "sphere, static": (scene(), scene(tables=FAR_SPHERE + CONTACT)),
+    "plane, dynamic": (scene(dynamic=True), scene(dynamic=True, tables=FAR_PLANE + CONTACT)),
+    "sphere, dynamic planar": (scene(dynamic=True, planar="true"), scene(dynamic=True, planar="true", tables=FAR_SPHERE + CONTACT)),
 }
 # Pairs that must cost the same.
 ABSENT = {
@@ -191,14 +203,14 @@ def present(bench, bless):
     return fine
 
 
-def absent(bench):
-    """Whether what is absent costs nothing."""
+def compared(bench, what, pairs, most):
+    """Whether the second scene of each pair costs no more than the first, but for the part `most` of it."""
     fine = True
-    costs = iter(bench.costs([text for pair in ABSENT.values() for text in pair], MANY_TO_COMPARE, ALLOCATOR_AND_COPIES))
-    for name, without, inert in zip(ABSENT, costs, costs):
-        holds = inert - without <= SAME * without
+    costs = iter(bench.costs([text for pair in pairs.values() for text in pair], MANY_TO_COMPARE, ALLOCATOR_AND_COPIES))
+    for name, without, inert in zip(pairs, costs, costs):
+        holds = inert - without <= most * without
         fine &= holds
-        print(f"{'ok ' if holds else 'X  '} absent: {name:<28} {inert:8.0f} instead of {without:.0f}")
+        print(f"{'ok ' if holds else 'X  '} {what}: {name:<28} {inert:8.0f} instead of {without:.0f}")
     return fine
 
 
@@ -223,7 +235,11 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(arguments.beamsim, Path(folder))
         try:
-            fine = [present(bench, arguments.bless), absent(bench)]
+            fine = [
+                present(bench, arguments.bless),
+                compared(bench, "absent", ABSENT, SAME),
+                compared(bench, "out of reach", FAR, NEARLY_SAME),
+            ]
         except UnknownInstruction:
             print("instruction counts: skipped from here on, this valgrind does not know an instruction of this build")
             return 0

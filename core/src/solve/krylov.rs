@@ -49,8 +49,6 @@ pub enum First {
     Largest,
     /// Those with a positive real part, the largest first, then the others; minor ones are left out
     Positive,
-    /// The same with a negative real part
-    Negative,
 }
 
 /// Size of the basis of a rough estimate of eigenvalues
@@ -67,6 +65,10 @@ const GROUP_SIZE: usize = 4;
 const LONG_PROJECTION: usize = 100;
 /// Relative change of eigenvalues between two projections at which they have converged
 const EIGENVALUE_TOLERANCE: f64 = 1e-11;
+/// The same of positive eigenvalues, which may be far from the largest
+const ONE_SIDED_TOLERANCE: f64 = 1e-8;
+/// The largest part of a positive eigenvalue that the next one is, if it is alone
+const NEXT_TO_ONE_ALONE: f64 = 0.5;
 /// Relative residual of an eigenvector at which it has converged where its eigenvalue only tells
 /// the sign of a growth
 const RESIDUAL_TOLERANCE: f64 = 1e-9;
@@ -78,7 +80,7 @@ const SAME_EIGENVALUE: f64 = 1e-7;
 const BESIDE_EIGENVALUE: f64 = 1e-12;
 /// Inverse iterations for a vector of a multiple eigenvalue
 const INVERSE_ITERATIONS: usize = 3;
-/// Eigenvalues of one sign that are smaller than this part of the largest of all are not looked for.
+/// Positive eigenvalues that are smaller than this part of the largest of all are not looked for.
 const MINOR: f64 = 1e-4;
 /// Vectors that orthogonalisation reduces to this part of their norm are linearly dependent on the
 /// basis.
@@ -96,7 +98,7 @@ pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option
     space.spectrum(operator.is_symmetric(), wanted)
 }
 
-/// The eigenvalues of largest magnitude, descending, `first` those of one sign, so many of them that `is_enough`, but no
+/// The eigenvalues of largest magnitude, descending, `first` the positive ones, so many of them that `is_enough`, but no
 /// more than `most_wanted`, or than the space has dimensions. `None` if an image cannot be computed, or after a request
 /// to stop.
 pub fn leading_eigenvalues_until(
@@ -175,7 +177,7 @@ fn most_vectors(operator: &dyn Operator, wanted: usize) -> usize {
     operator.size().min(24 * wanted + 160)
 }
 
-/// A space of at most `most` vectors in which the `wanted` eigenvalues of largest magnitude, `first` those of one sign,
+/// A space of at most `most` vectors in which the `wanted` eigenvalues of largest magnitude, `first` the positive ones,
 /// have converged, or so many of them that `is_enough`, and those eigenvalues. `None` if an image cannot be computed, or after a request
 /// to stop.
 fn converged_space(
@@ -186,6 +188,10 @@ fn converged_space(
     is_enough: &dyn Fn(&[Complex<f64>]) -> bool,
 ) -> Option<(KrylovSpace, Vec<Complex<f64>>)> {
     let mut space = KrylovSpace::starting(operator, BLOCK_SIZE)?;
+    let (tolerance, next_to_it) = match first {
+        First::Largest => (EIGENVALUE_TOLERANCE, 0.0),
+        First::Positive => (ONE_SIDED_TOLERANCE, NEXT_TO_ONE_ALONE),
+    };
     // A few more eigenvalues than wanted must converge, lest the second of a pair is missed.
     let guard = wanted + BLOCK_SIZE;
     let mut last: Vec<Complex<f64>> = Vec::new();
@@ -199,14 +205,18 @@ fn converged_space(
         look = space.applied() + space.applied() / 4;
         let mut now = space.eigenvalues(operator.is_symmetric(), first)?;
         now.truncate(guard);
-        let same = |&(a, b): &(&Complex<f64>, &Complex<f64>)| (a - b).norm() <= EIGENVALUE_TOLERANCE * a.norm();
+        let same = |&(a, b): &(&Complex<f64>, &Complex<f64>)| (a - b).norm() <= tolerance * a.norm();
         let converged = now.iter().zip(&last).take_while(same).count();
         let is_all = converged == now.len().max(last.len()) && converged >= wanted.min(operator.size());
         if is_all || !grows {
             now.truncate(wanted);
             return Some((space, now));
         }
-        let leading = converged.saturating_sub(BLOCK_SIZE);
+        // The second of a pair is not missed where the next eigenvalue is far smaller.
+        let is_alone =
+            |count: usize| now.get(count).is_some_and(|next| next.norm() <= next_to_it * now[count - 1].norm());
+        let leading =
+            (1..=converged).rev().find(|&count| count + BLOCK_SIZE <= converged || is_alone(count)).unwrap_or(0);
         if is_enough(&now[..leading]) {
             now.truncate(leading);
             return Some((space, now));
@@ -479,14 +489,12 @@ impl KrylovSpace {
             false => on_projection(self.projection(), eigenvalues)?,
         };
         sort_by(&mut values, largest_first);
-        let sign = match first {
-            First::Largest => return Some(values),
-            First::Positive => 1.0,
-            First::Negative => -1.0,
-        };
+        if first == First::Largest {
+            return Some(values);
+        }
         let least = values.first().map_or(0.0, |largest| MINOR * largest.norm());
         values.retain(|value| value.norm() >= least);
-        let (mut values, others): (Vec<_>, Vec<_>) = values.into_iter().partition(|value| value.re * sign > 0.0);
+        let (mut values, others): (Vec<_>, Vec<_>) = values.into_iter().partition(|value| value.re > 0.0);
         values.extend(others);
         Some(values)
     }

@@ -57,13 +57,12 @@ pub fn unpaired_critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec
 }
 
 /// The critical load with `before` others between it and the present one in the direction `way`, as it looks from
-/// here.
+/// here, if it is among the nearest on both sides.
 pub fn next_critical_load(stage: &mut StageRun, way: f64, before: usize) -> Result<Option<f64>, Failure> {
     let load = stage.state.load;
     let lies_there = |ahead: f64| ahead * way > 0.0;
-    let first = if way < 0.0 { First::Negative } else { First::Positive };
     let is_enough = |ahead: &[f64]| ahead.iter().filter(|&&ahead| lies_there(ahead)).count() > before;
-    let loads = nearest_critical_loads(stage, before + 4, first, &is_enough)?;
+    let loads = nearest_critical_loads(stage, before + 4, First::Largest, &is_enough)?;
     Ok(loads.into_iter().filter(|critical| lies_there(critical - load)).nth(before))
 }
 
