@@ -88,7 +88,7 @@ def seen(d, run, x, row):
 def depth(d, run):
     """How deep the deepest point is at the end, as a part of what is allowed."""
     k = d['contact'][0]
-    if 'with' in k: return (sum(k['radius'].values()) - np.linalg.norm(between(shape(d, run, 'b'), shape(d, run, 'c')))) / k['penetration']
+    if 'with' in k: return (sum(k['radius'].values()) - np.linalg.norm(between(*(shape(d, run, b) for b in 'bc')))) / k['penetration']
     if 'nodes' in k: x = vectors(run, k['nodes'], 'xyz')
     else: x, order = shape(d, run, 'b'); x = line(x, order, spread(x))
     return (k['radius'] - distance(d['surface'][0], seen(d, run, x, -1)).min()) / k.get('penetration', k['radius'] / 1000)
@@ -99,21 +99,26 @@ def unbalanced(d, run):
     worst, (pressed, twisted) = 0., vectors(run, ['k'], ['fx', 'fy', 'fz', 'mx', 'my', 'mz'])[0].reshape(2, 3)
     for part, sign in [('b', 1)] + [('c', -1)] * ('with' in d['contact'][0]):
         at = nodes(d, part); x, f, m = (vectors(run, at, n) for n in ('xyz', ['fx', 'fy', 'fz'], ['mx', 'my', 'mz']))
-        ends = next(b['through'] for b in d['beam'] if b['name'] == part); length = np.linalg.norm(np.subtract(*(d['point'][e] for e in ends)))
+        ends = next(b['through'] for b in d['beam'] if b['name'] == part)
+        length = np.linalg.norm(np.subtract(*(d['point'][e] for e in ends)))
         along = sum((length * np.array(l['force']) for l in d.get('load', []) if l.get('along') == part), np.zeros(3))
         tip = sum((np.array(l['force']) for l in d.get('load', []) if l.get('at') in ends), np.zeros(3))
-        size = max(np.abs(v).max() for v in (f, pressed, along, tip)) or 1.
+        least = 1e-6 * d['section']['s']['EI'][0] / length**2                # less is round-off
+        size = max(least, *(np.abs(v).max() for v in (f, pressed, along, tip)))
         off = [np.abs(f.sum(axis=0) + sign * pressed + along + tip).max()]
         if not along.any() and not any('on' in s for s in d.get('surface', [])):
-            off.append(np.abs((np.cross(x, f) + m).sum(axis=0) + np.cross(x[-1], tip) + sign * twisted).max() / max(length, np.abs(x).max()))
+            m = (np.cross(x, f) + m).sum(axis=0) + np.cross(x[-1], tip) + sign * twisted
+            off.append(np.abs(m).max() / max(length, np.abs(x).max()))
         worst = max(worst, *(o / size for o in off))
     return worst
 
 def crossed(d, run):
-    """Does a beam come to the other side along the chords between two rows? A wide way round in one level looks the same."""
-    rows = range(len(run.rows))
-    if 'with' in d['contact'][0]:
-        gaps = [unit(between(shape(d, run, 'b', i), shape(d, run, 'c', i))) for i in rows]
+    """Does a beam come to the other side along the chords between two rows? A wide way round in one level looks the same. Beams along each
+    other are not looked at: they may slide off each other sideways."""
+    rows, away = range(len(run.rows)), [unit(x[-1] - x[0]) for x, _ in (shape(d, run, b['name'], 0) for b in d['beam'] if b['name'] in 'bc')]
+    if len(away) == 2:
+        if abs(away[0] @ away[1]) > .97: return False
+        gaps = [unit(between(*(shape(d, run, b, i) for b in 'bc'))) for i in rows]
         return any(a @ b < -.5 for a, b in zip(gaps, gaps[1:]))
     s = d['surface'][0]; x = [seen(d, run, shape(d, run, 'b', i)[0], i) for i in rows]
     thick = 0 if s['kind'] == 'plane' else .5 * np.min(s.get('radius', s.get('half')))
@@ -122,14 +127,16 @@ def crossed(d, run):
 def insane(d, run, fine):
     """What is wrong with a fall: momentum, energy, friction, depth, and the end of a ball's way beside that in quarters of the steps."""
     t, total, kinetic = run.col('time'), run.col('energy.total'), run.col('energy.kinetic').max(); out = []
-    mass = d['body'][0]['mass'] if 'body' in d else d['section']['s']['rhoA'] * np.linalg.norm(np.subtract(d['point']['e'], d['point']['a']))
+    ends = [d['point'][e] for e in 'ae'] if 'beam' in d else None
+    mass = d['section']['s']['rhoA'] * np.linalg.norm(np.subtract(*ends)) if ends else d['body'][0]['mass']
     f, p = (np.array([run.col(n + c) for c in 'xyz']).T for n in ('k.f', 'momentum.p'))
     given = np.vstack([np.zeros(3), np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(t)[:, None], axis=0)]) + mass * np.outer(t, d['gravity'])
     lost, drift = np.abs(p - p[0] - given).max() / np.linalg.norm(p[0]), np.ptp(total) / kinetic
     if lost > .03: out.append(f'momentum off by {lost:.2g}')
     if drift > .05: out.append(f'energy off by {drift:.2g}')
     if np.diff(run.col('energy.friction')).min() < -.01 * kinetic: out.append('friction gives energy')
-    if np.any(run.col('k.friction') > d['contact'][0]['friction'] * run.col('k.normal') * (1 + 1e-6)): out.append('friction beyond its limit')
+    limit = d['contact'][0]['friction'] * run.col('k.normal') * (1 + 1e-6)
+    if np.any(run.col('k.friction') > limit): out.append('friction beyond its limit')
     if depth(d, run) > 1: out.append('too deep at the end')
     if 'body' in d and fine.ok:
         way = vectors(fine, ['ball'], 'xyz') - vectors(fine, ['ball'], 'xyz', 0)

@@ -83,7 +83,7 @@ def pushed(g):
     if min(distance(s, home(path, held, f)).min() for f in np.linspace(0, 1, 9)) < room: return None
     if way in ('move', 'turn', 'history', 'swing'): s.update(path)
     if way == 'history': s['history'] = 'out'; d['history'] = dict(out=dict(times=[0, .4, 1.], values=[0, 1, g.uniform(.3, .9)]))
-    if way == 'load': d['load'] = [dict(at='e', force=list(u * power(g, 0, 1.2))) if fixed else dict(along='b', force=list(u * power(g, 0, 2)))]
+    if way == 'load': d['load'] = [dict({'at': 'e'} if fixed else dict(along='b'), force=list(u * power(g, 0, 1.2 if fixed else 2)))]
     if way == 'motion': moved(d, ['a', 'e'], depth * u)
     if way in ('body', 'arm'): carried(d, s, u, depth, way == 'arm')
     d['surface'] = [dict(s, name='s')]; d['contact'][0]['surfaces'] = ['s']
@@ -92,12 +92,14 @@ def pushed(g):
 def pair(g):
     """A beam and another one above it, across or along, that come together."""
     fixed, across, g0 = g.random() < .6, g.random() < .7, power(g, -3, -1); d = start(g, fixed); k = d['contact'][0]
-    first, r = k['radius'], k['radius'] * power(g, -.5, .5); yaw, half = (g.uniform(.35, 2.8), g.uniform(.3, .8)) if across else (g.uniform(-.1, .1), .5)
+    first, r = k['radius'], k['radius'] * power(g, -.5, .5)
+    yaw, half = (g.uniform(.35, 2.8), g.uniform(.3, .8)) if across else (g.uniform(-.1, .1), .5)
     w = np.array([np.cos(yaw), np.sin(yaw), 0]) * half; way = np.array([0, 0, -g0 - g.uniform(.02, .15)])
     m = np.array([g.uniform(.3, .8) if across else .8, 0 if across else g.uniform(-1, 1) * r, first + r + g0])
     o, n, EI, held = int(g.integers(1, 4)), int(g.integers(2, 15)), power(g, -1, 1), ['c0', 'c1'] if across else ['c0']
     d['point'].update(c0=list(m + w), c1=list(m - w)); d['section']['t'] = dict(EA=1e3 * EI, GA=400 * EI, GJ=.8 * EI, EI=EI)
-    d['beam'].append(dict(beam('c', 'c0', 'c1', elements=n, order=o), section='t')); d['output']['nodes'] += [f'c:{i}' for i in range(n * o + 1)]
+    d['beam'].append(dict(beam('c', 'c0', 'c1', elements=n, order=o), section='t'))
+    d['output']['nodes'] += [f'c:{i}' for i in range(n * o + 1)]
     d['support'] += [dict(at=p, fix=list(ALL)) for p in held]
     k.update({'with': ['c'], 'radius': dict(b=first, c=r), 'penetration': k.get('penetration', 1e-3 * min(first, r))})
     if g.random() < .6: moved(d, held, way)

@@ -415,26 +415,25 @@ impl Contacts for SurfaceContacts {
     fn survey(&self, at: &State) -> ContactSurvey {
         let mut out = ContactSurvey::default();
         let mut largest_force = 0.0f64;
+        // Of each point the force, the gap, that over what is allowed, and a slot.
+        let mut points = Vec::new();
         self.each_chain(at, Weights::NONE, &mut |_, chain| {
             chain.each_point(Weights::NONE, &mut |point, _| {
-                largest_force = largest_force.max(point.state.normal_force.force);
-            });
-        });
-        self.each_chain(at, Weights::NONE, &mut |_, chain| {
-            chain.each_point(Weights::NONE, &mut |point, _| {
-                let force = point.state.normal_force.force;
-                let gap = point.state.gap;
+                let (force, gap) = (point.state.normal_force.force, point.state.gap);
+                largest_force = largest_force.max(force);
                 out.points += usize::from(force > 0.0);
                 out.work_in_penetration += force * chain.laws.penetration;
-                let is_relevant = gap < 0.0 || force > RELEVANT_FORCE * largest_force;
-                let violation = gap.abs() / chain.laws.penetration;
-                if is_relevant && violation > out.violation {
-                    out.violation = violation;
-                    out.gap = gap;
-                    out.slot = chain.slot_of(point.candidate);
+                if gap < 0.0 || force > 0.0 {
+                    points.push((force, gap, gap.abs() / chain.laws.penetration, chain.slot_of(point.candidate)));
                 }
             });
         });
+        for (force, gap, violation, slot) in points {
+            let is_relevant = gap < 0.0 || force > RELEVANT_FORCE * largest_force;
+            if is_relevant && violation > out.violation {
+                (out.violation, out.gap, out.slot) = (violation, gap, slot);
+            }
+        }
         self.pairs().survey(at, &mut out);
         out
     }
