@@ -63,9 +63,9 @@ pub trait Contacts {
     /// the next step does not look at it, and must ask this at its end.
     fn list_missed(&self, from: &mut State, to: &mut State) -> Missed;
 
-    /// Looks again in `from` at what is put aside there and may meet its surface on the way to the end of a failed
-    /// step; true if there is some.
-    fn look_for(&self, from: &mut State, to: &State) -> bool;
+    /// Looks again in `from` at what is put aside there and may meet its surface on the way to a state within a step, or
+    /// at the end of a failed one; a slot of it, if there is some.
+    fn look_for(&self, from: &mut State, to: &State) -> Option<Slot>;
 
     /// Looks again at all that is put aside in an accepted state.
     fn look_everywhere(&self, at: &mut State);

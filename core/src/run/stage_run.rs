@@ -399,12 +399,21 @@ impl StageRun<'_> {
         }
     }
 
+    /// The same of a state within the step, which a surface may reach and leave again.
+    pub fn refuse_missed_before(&mut self, within: &State) -> Result<(), NewtonFailure> {
+        let Some(contacts) = self.model.contacts() else { return Ok(()) };
+        match contacts.look_for(self.good, within) {
+            Some(slot) => Err(NewtonFailure::Passes { slot: slot as usize }),
+            None => Ok(()),
+        }
+    }
+
     /// After a failed step: goes back to the last good state. True if more pairs of beams are listed there now, or
     /// more surfaces looked at, with which the step may succeed.
     pub fn looks_at_more(&mut self) -> bool {
         let has_more =
             !self.assembly.fits(self.good) || self.good.contacts.clearances != self.state.contacts.clearances;
-        let finds_more = |contacts: &dyn Contacts| contacts.look_for(self.good, self.state);
+        let finds_more = |contacts: &dyn Contacts| contacts.look_for(self.good, self.state).is_some();
         if !has_more && !self.model.contacts().is_some_and(finds_more) {
             return false;
         }

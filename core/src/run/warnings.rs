@@ -109,6 +109,10 @@ impl StageRun<'_> {
     /// such points are failures.
     pub fn warn_of_hidden_penetration(&mut self) {
         let Some(contacts) = self.model.contacts() else { return };
+        // A stage that has not begun has its own failure.
+        if self.state.load == 0.0 {
+            return;
+        }
         let Some(Penetration { contact, surface, depth, .. }) = contacts.hidden_penetration(self.state) else { return };
         let stage = self.number + 1;
         let message = format!(

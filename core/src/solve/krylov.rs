@@ -178,8 +178,8 @@ fn most_vectors(operator: &dyn Operator, wanted: usize) -> usize {
 }
 
 /// A space of at most `most` vectors in which the `wanted` eigenvalues of largest magnitude, `first` the positive ones,
-/// have converged, or so many of them that `is_enough`, and those eigenvalues. `None` if an image cannot be computed, or after a request
-/// to stop.
+/// have converged, or so many of them that `is_enough`, and those eigenvalues. `None` if an image cannot be computed, or
+/// after a request to stop.
 fn converged_space(
     operator: &mut dyn Operator,
     wanted: usize,
@@ -214,7 +214,7 @@ fn converged_space(
         }
         // The second of a pair is not missed where the next eigenvalue is far smaller.
         let is_alone =
-            |count: usize| now.get(count).is_some_and(|next| next.norm() <= next_to_it * now[count - 1].norm());
+            |count: usize| now.get(count).is_some_and(|next| next.norm() < next_to_it * now[count - 1].norm());
         let leading =
             (1..=converged).rev().find(|&count| count + BLOCK_SIZE <= converged || is_alone(count)).unwrap_or(0);
         if is_enough(&now[..leading]) {
@@ -493,7 +493,7 @@ impl KrylovSpace {
             return Some(values);
         }
         let least = values.first().map_or(0.0, |largest| MINOR * largest.norm());
-        values.retain(|value| value.norm() >= least);
+        values.retain(|value| value.re <= 0.0 || value.norm() >= least);
         let (mut values, others): (Vec<_>, Vec<_>) = values.into_iter().partition(|value| value.re > 0.0);
         values.extend(others);
         Some(values)

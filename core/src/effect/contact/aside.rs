@@ -6,8 +6,11 @@
 use super::chain_now::before_of;
 use super::{Missed, SurfaceContacts};
 use crate::kernel::Weights;
-use crate::system::{Clearance, State};
+use crate::system::{Clearance, Slot, State};
 use std::sync::Arc;
+
+/// So many steps like the last one must lead nowhere near a surface from which something is put aside.
+const STEPS_AHEAD: f64 = 2.0;
 
 impl SurfaceContacts {
     /// The clearance of a chain whose contact acts and that touches nothing.
@@ -22,21 +25,32 @@ impl SurfaceContacts {
     /// True if a chain keeps its clearance on the way between two states.
     fn lasts(&self, number: usize, ends: [&Clearance; 2], from: &State, to: &State) -> bool {
         let surface = &self.surfaces[self.chains[number].surface];
-        let arc = surface.arc_beside_chord(ends.map(|end| end.middle), from, to);
-        ends[0].lasts_until(ends[1], arc)
+        ends[0].lasts_until(ends[1], surface.off_chord(ends.map(|end| end.middle), from, to))
     }
 
     /// Puts aside in `to`, where a step has ended, what is far from its surface. Looks again in `from`, where it
     /// began, at what was put aside there and may have come near: the step is to be taken again.
     pub(super) fn put_aside(&self, from: &mut State, to: &mut State) -> Missed {
-        let clearances = self.clearances(to);
-        match self.look_for_missed(from, to, &clearances) {
-            Some(first) => Missed::Listed(self.chains[first].nodes[0].node.u),
-            None => {
-                to.contacts.clearances = Arc::new(clearances);
-                Missed::None
+        let mut clearances = self.clearances(to);
+        if let Some(slot) = self.look_for_missed(from, to, &clearances) {
+            return Missed::Listed(slot);
+        }
+        for (number, clearance) in clearances.iter_mut().enumerate() {
+            if from.contacts.clearance(number).is_none()
+                && clearance.is_some_and(|it| self.comes_soon(number, &it, from))
+            {
+                *clearance = None;
             }
         }
+        to.contacts.clearances = Arc::new(clearances);
+        Missed::None
+    }
+
+    /// True if the next step, which may go as far as the last one from `from`, may end near the surface.
+    fn comes_soon(&self, number: usize, now: &Clearance, from: &State) -> bool {
+        let chain = &self.chains[number];
+        let middle = self.surfaces[chain.surface].on_surface(chain.middle(from), from);
+        now.gap - now.reach < STEPS_AHEAD * (now.middle - middle).norm()
     }
 
     /// The clearances of all chains in a state.
@@ -45,8 +59,8 @@ impl SurfaceContacts {
     }
 
     /// Looks again in `from` at what is put aside there and may have come near to its surface on the way to a state
-    /// with other clearances; the number of the first such chain.
-    pub(super) fn look_for_missed(&self, from: &mut State, to: &State, after: &[Option<Clearance>]) -> Option<usize> {
+    /// with other clearances; a slot of the first such chain.
+    pub(super) fn look_for_missed(&self, from: &mut State, to: &State, after: &[Option<Clearance>]) -> Option<Slot> {
         let came_near = |number: &usize| match (from.contacts.clearance(*number), &after[*number]) {
             (None, _) => false,
             (Some(_), None) => true,
@@ -56,7 +70,7 @@ impl SurfaceContacts {
         if !near.is_empty() {
             self.look_at(&near, from);
         }
-        near.first().copied()
+        near.first().map(|&first| self.chains[first].nodes[0].node.u)
     }
 
     /// Looks again at all chains that were put aside in an accepted state.

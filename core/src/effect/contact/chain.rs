@@ -180,11 +180,17 @@ impl Chain {
         SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points, regime }.candidates()
     }
 
+    /// The place of the middle node (global components).
+    pub(super) fn middle(&self, at: &State) -> Vec3 {
+        let node = &self.nodes[self.nodes.len() / 2];
+        node.place + at.q[node.node.u as usize]
+    }
+
     /// The ball around the middle node that holds the chain; `None` if it meets the surface. Without it
     /// no point of the chain has a force.
     pub(super) fn clearance(&self, surface: &SceneSurface, at: &State) -> Option<Clearance> {
         let place = |node: &ChainNode| node.place + at.q[node.node.u as usize];
-        let centre = place(&self.nodes[self.nodes.len() / 2]);
+        let centre = self.middle(at);
         let middle = surface.on_surface(centre, at);
         let gap = surface.surface.distance(middle).ok()?.value - self.radius * (1.0 + MARGIN);
         let factor = REACH[self.order + 1];

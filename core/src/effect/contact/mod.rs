@@ -452,9 +452,9 @@ impl Contacts for SurfaceContacts {
         }
     }
 
-    fn look_for(&self, from: &mut State, to: &State) -> bool {
+    fn look_for(&self, from: &mut State, to: &State) -> Option<Slot> {
         let clearances = self.clearances(to);
-        self.look_for_missed(from, to, &clearances).is_some()
+        self.look_for_missed(from, to, &clearances)
     }
 
     fn look_everywhere(&self, at: &mut State) {

@@ -2,7 +2,7 @@
 
 use crate::kernel::Weights;
 use crate::kernel::contact::{Carrier, Shape, Side, Surface};
-use crate::rotation::Rotation;
+use crate::rotation::{Rotation, relative_angle};
 use crate::system::{MirrorData, Node, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 
@@ -76,16 +76,20 @@ impl SceneSurface {
         }
     }
 
-    /// The angle of a prescribed rotation between two states times the farther of two distances from its axis: how far
-    /// the way of a place is from its chord, at most.
-    pub(super) fn arc_beside_chord(&self, ends: [Vec3; 2], from: &State, to: &State) -> f64 {
-        match self.carrier {
+    /// How far the way of a place, between two ends (axes of the surface), may be off its chord, a length: twice the
+    /// angle by which the surface turns between the states times the farther distance of the ends from what it turns about.
+    pub(super) fn off_chord(&self, ends: [Vec3; 2], from: &State, to: &State) -> f64 {
+        let (angle, levers) = match self.carrier {
             SurfaceCarrier::Turn { about, axis, .. } => {
-                let lever = ends.map(|end| axis.cross(end - about).norm());
-                self.turned(&from.amplitude, &to.amplitude) * lever[0].max(lever[1])
+                (self.turned(&from.amplitude, &to.amplitude), ends.map(|end| axis.cross(end - about).norm()))
             }
-            SurfaceCarrier::Ground | SurfaceCarrier::Node { .. } | SurfaceCarrier::Shift { .. } => 0.0,
-        }
+            SurfaceCarrier::Node { node, place } => {
+                let [before, after] = [from, to].map(|at| at.rotation(node.p).r);
+                (relative_angle(before, after), ends.map(|end| (end - place).norm()))
+            }
+            SurfaceCarrier::Ground | SurfaceCarrier::Shift { .. } => return 0.0,
+        };
+        2.0 * angle * levers[0].max(levers[1])
     }
 
     /// A place (global components) in the axes of the surface.

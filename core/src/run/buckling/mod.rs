@@ -178,17 +178,9 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         // Next to a critical load round-off moves the scene along; the load itself is closed in by
         // pivots.
         let uncertainty = self.stage.counters.work.uncertainty;
-        let mut found = Vec::new();
-        let mut directions = [SoFar::default(); 2];
-        for number in 0..loads.len() {
-            let direction = &mut directions[usize::from(loads[number] < load)];
-            if direction.limit != PathLimit::Reached {
-                let next = self.find(&loads, number, &start, direction)?;
-                direction.limit = direction.limit.after(&next);
-                direction.foreseen = is_near(loads[number], next.critical.load, WELL_FORESEEN).then_some(loads[number]);
-                found.extend((direction.limit != PathLimit::Reached).then_some(next.critical));
-            }
-        }
+        let (above, below): (Vec<f64>, Vec<f64>) = loads.into_iter().partition(|&critical| critical > load);
+        let mut found = self.find_all(&above, &start)?;
+        found.extend(self.find_all(&below, &start)?);
         self.stage.counters.work.uncertainty = uncertainty;
         sort_by(&mut found, |a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
         self.stage.counters.steps += 1;
@@ -218,18 +210,27 @@ impl Buckling<'_, '_> {
         Ok(())
     }
 
+    /// The critical loads on one side of the present one that look from the start like these, up to a limit point
+    /// that ends the path.
+    fn find_all(&mut self, loads: &[f64], start: &State) -> Result<Vec<CriticalLoad>, Failure> {
+        let mut found = Vec::new();
+        let mut so_far = SoFar::default();
+        for (number, &seen) in loads.iter().enumerate() {
+            let next = self.find(loads, number, start, &so_far)?;
+            so_far.limit = so_far.limit.after(&next);
+            if so_far.limit == PathLimit::Reached {
+                break;
+            }
+            so_far.foreseen = is_near(seen, next.critical.load, WELL_FORESEEN).then_some(seen);
+            found.push(next.critical);
+        }
+        Ok(found)
+    }
+
     /// The critical load that looks from the start as number `number` of these. The state is then
     /// the start again.
     fn find(&mut self, loads: &[f64], number: usize, start: &State, so_far: &SoFar) -> Result<Found, Failure> {
-        let is_back = |load: f64| load < start.load;
-        let on_this_side = |load: &&f64| is_back(**load) == is_back(loads[number]);
-        // Of the loads on this side of the present one it is number `before`.
-        let before = loads[..number].iter().filter(on_this_side).count();
-        let aim = Aim {
-            sight: Sight { from: start.load, critical: loads[number] },
-            before,
-            nearest: *loads.iter().find(on_this_side).unwrap_or(&loads[number]),
-        };
+        let aim = Aim { sight: Sight { from: start.load, critical: loads[number] }, before: number, nearest: loads[0] };
         if so_far.limit == PathLimit::Imperfect {
             let seen = self.sights(&aim)?;
             self.stage.go_back_to(start)?;
@@ -238,10 +239,10 @@ impl Buckling<'_, '_> {
         // The look from the start is as much work as a search.
         let count = loads.len() as f64;
         let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
-        let mut found = self.follow(loads[number], before, &done)?;
+        let mut found = self.follow(loads[number], number, &done)?;
         self.stage.go_back_to(start)?;
         if found.critical.kind == CriticalKind::Estimate {
-            found.critical.load = self.extrapolate(loads[number], before)?.unwrap_or(found.critical.load);
+            found.critical.load = self.extrapolate(loads[number], number)?.unwrap_or(found.critical.load);
         } else if let Some(perfect) = self.imperfect(&found, &aim, so_far)? {
             found = perfect;
         }

@@ -67,7 +67,8 @@ pub fn next_critical_load(stage: &mut StageRun, way: f64, before: usize) -> Resu
 }
 
 /// The critical loads nearest to the present one, as they look from the present state; those above it come first.
-/// `first` are looked for those on one side. There are so many that `is_enough`, which is given their distances from the present load, or `modes` and some more.
+/// `first` are looked for those on one side. There are so many that `is_enough`, which is given their distances from the
+/// present load, or `modes` and some more.
 fn nearest_critical_loads(
     stage: &mut StageRun,
     modes: usize,
@@ -96,7 +97,7 @@ fn nearest_critical_loads(
     let stable = negative == Some(0);
     let system = &assembly.system;
     let symmetric = stable && model.multipliers.is_empty();
-    let symmetric = symmetric && varied.ends.iter().all(|end| is_symmetric(&system.pattern, &end.values));
+    let symmetric = symmetric && is_symmetric(&system.pattern, &varied.difference());
     let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
     let load = state.load;
     let is_real = |distance: &Complex<f64>| {
@@ -153,6 +154,12 @@ impl TangentAtEnd {
 }
 
 impl VariedTangent {
+    /// The difference of both tangents, entry by entry: what makes it unsymmetric is not small beside it.
+    fn difference(&self) -> Vec<f64> {
+        let [after, before] = self.ends.each_ref().map(|end| &end.values);
+        after.iter().zip(before).map(|(after, before)| after - before).collect()
+    }
+
     fn multiply(&self, system: &System, x: &[f64]) -> Vec<f64> {
         let [after, before] = self.ends.each_ref().map(|end| end.multiply(system, x));
         after.iter().zip(&before).map(|(after, before)| (after - before) / self.width).collect()

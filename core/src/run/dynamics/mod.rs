@@ -347,6 +347,9 @@ impl Dynamics<'_, '_> {
         self.stage.refuse_leaps()?;
         self.stage.refuse_passing()?;
         self.stage.refuse_missed()?;
+        if let Some(middle) = &self.middle {
+            self.stage.refuse_missed_before(&middle.state)?;
+        }
         let StageRun { assembly, newton, state, good, .. } = &mut *self.stage;
         newton.end_step(&assembly.system, StepEnds { from: good, to: state }, &step, self.increments.as_ref());
         Ok(())

@@ -107,11 +107,11 @@ impl StageRun<'_> {
             contacts.stick_part = attempts.softened_stick;
             (contacts.goes_on, contacts.resists) = (attempts.goes_on, attempts.resists);
             let attempt = self.attempt_once(load).and_then(|()| self.augment());
-            let attempt = attempt.and_then(|()| self.refuse_missed());
             (self.state.contacts.goes_on, self.state.contacts.resists) = (true, false);
-            let failure = match attempt {
-                // A part that has left all that held it has come to no balance of its own.
-                Ok(()) if attempts.resists && !self.state_touches() => NewtonFailure::Singular(None),
+            // A part that has left all that held it has come to no balance of its own.
+            let has_left = attempt.is_ok() && attempts.resists && !self.state_touches();
+            let attempt = if has_left { Err(NewtonFailure::Singular(None)) } else { attempt };
+            let failure = match attempt.and_then(|()| self.refuse_missed()) {
                 Ok(()) => {
                     if attempts.softened_stick < 1.0 {
                         self.state.contacts.first_factor = self.good.contacts.first_factor;

@@ -112,6 +112,7 @@ impl Path {
     fn with_measure(stage: &mut StageRun, rate: Vec<Vec3>) -> Self {
         if let Some(contacts) = stage.model.contacts() {
             contacts.look_everywhere(stage.state);
+            contacts.look_everywhere(stage.good);
         }
         let moved = squared(stage, &rate);
         let rotated = stage.model.kinds.iter().zip(&rate).filter(|(kind, _)| **kind == SlotKind::Rotation);

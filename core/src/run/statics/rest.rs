@@ -232,6 +232,14 @@ impl<'s, 'r> Descent<'s, 'r> {
         model.largest_force(&self.assembly.system) / (GENTLE * model.length)
     }
 
+    /// After a failed step: goes back to the last good state. True if more surfaces are looked at there than before.
+    fn looks_at_surfaces(&mut self) -> bool {
+        let StageRun { state, good, .. } = &mut *self.stage;
+        let looks = good.contacts.clearances != state.contacts.clearances;
+        state.copy_all_but_rates(good);
+        looks
+    }
+
     /// One step from the run's state; in the first, whose load factor is given, prescribed motions
     /// come in. `false` where it finds no balance, or none that is a minimum: with less resistance
     /// than some motion gains by the forces there is no way along them.
@@ -253,7 +261,7 @@ impl<'s, 'r> Descent<'s, 'r> {
         let solved = solved.and_then(|()| self.stage.refuse_passing());
         let solved = solved.and_then(|()| self.stage.refuse_missed());
         if solved.is_err() {
-            return false;
+            return self.looks_at_surfaces() && self.step_against(resistance, first);
         }
         let StageRun { state, counters, .. } = &mut *self.stage;
         let signature = self.newton.signature_at(&mut self.assembly, state, &mut counters.work);
