@@ -103,7 +103,7 @@ def unbalanced(d, run):
         length = np.linalg.norm(np.subtract(*(d['point'][e] for e in ends)))
         along = sum((length * np.array(l['force']) for l in d.get('load', []) if l.get('along') == part), np.zeros(3))
         tip = sum((np.array(l['force']) for l in d.get('load', []) if l.get('at') in ends), np.zeros(3))
-        least = 1e-6 * d['section']['s']['EI'][0] / length**2                # less is round-off
+        least = 1e-9 * d['section']['s']['EA']                              # of which round-off is left where nothing acts
         size = max(least, *(np.abs(v).max() for v in (f, pressed, along, tip)))
         off = [np.abs(f.sum(axis=0) + sign * pressed + along + tip).max()]
         if not along.any() and not any('on' in s for s in d.get('surface', [])):
@@ -115,9 +115,10 @@ def unbalanced(d, run):
 def crossed(d, run):
     """Does a beam come to the other side along the chords between two rows? A wide way round in one level looks the same. Beams along each
     other are not looked at: they may slide off each other sideways."""
-    rows, away = range(len(run.rows)), [unit(x[-1] - x[0]) for x, _ in (shape(d, run, b['name'], 0) for b in d['beam'] if b['name'] in 'bc')]
-    if len(away) == 2:
-        if abs(away[0] @ away[1]) > .97: return False
+    rows = range(len(run.rows))
+    if 'with' in d['contact'][0]:
+        b, c = (unit(x[-1] - x[0]) for x, _ in (shape(d, run, part, 0) for part in 'bc'))
+        if abs(b @ c) > .97: return False
         gaps = [unit(between(*(shape(d, run, b, i) for b in 'bc'))) for i in rows]
         return any(a @ b < -.5 for a, b in zip(gaps, gaps[1:]))
     s = d['surface'][0]; x = [seen(d, run, shape(d, run, 'b', i)[0], i) for i in rows]
