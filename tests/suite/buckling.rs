@@ -58,8 +58,7 @@ fn columns_in_any_direction_have_double_branches() {
     let mut random = Random::new(43);
     for case in 0..30 {
         let length = 10f64.powf(random.range(-1.0, 2.0));
-        let along = random.direction();
-        let across = along.cross(random.direction()).normalized().unwrap();
+        let [along, across] = random.axes();
         let bending = 10f64.powf(random.range(-1.0, 2.0));
         let stretching = bending / (length * length) * 10f64.powf(random.range(4.0, 7.0));
         let exact = std::f64::consts::PI.powi(2) / 4.0 * bending / (length * length);
@@ -339,8 +338,7 @@ fn shafts_buckle_under_the_torque_that_twists_them() {
     let mut random = Random::new(117);
     for _ in 0..12 {
         let length = 10f64.powf(random.range(-2.0, 2.0));
-        let along = random.direction();
-        let across = along.cross(random.direction()).normalized().unwrap();
+        let [along, across] = random.axes();
         let aside = along.cross(across);
         let bending = 10f64.powf(random.range(-2.0, 2.0));
         let twisting = bending * 10f64.powf(random.range(-0.3, 2.0));

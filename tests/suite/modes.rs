@@ -398,8 +398,7 @@ fn bodies_on_columns_that_turn_have_their_two_modes() {
     let mut random = Random::new(731);
     for _ in 0..24 {
         let length = 10f64.powf(random.range(-2.0, 2.0));
-        let along = random.direction();
-        let across = along.cross(random.direction()).normalized().unwrap();
+        let [along, across] = random.axes();
         let bending = [1.0, random.range(1.05, 2.0)];
         let stiff = 10f64.powf(random.range(5.0, 7.5)) / (length * length);
         let [tension, mass] = [random.range(0.5, 4.0) / (length * length), random.range(0.02, 0.2)];

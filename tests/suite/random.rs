@@ -41,6 +41,12 @@ impl Random {
         }
     }
 
+    /// Two orthogonal unit vectors, all directions alike.
+    pub fn axes(&mut self) -> [Vec3; 2] {
+        let along = self.direction();
+        [along, along.cross(self.direction()).normalized().unwrap()]
+    }
+
     /// A vector of this length.
     pub fn vector(&mut self, length: f64) -> Vec3 {
         self.direction() * length

@@ -399,8 +399,8 @@ impl StageRun<'_> {
         }
     }
 
-    /// The same of a state within the step, which a surface may reach and leave again.
-    pub fn refuse_missed_before(&mut self, within: &State) -> Result<(), NewtonFailure> {
+    /// The same for a state within the step: a surface may come near there and leave again.
+    pub fn refuse_missed_within(&mut self, within: &State) -> Result<(), NewtonFailure> {
         let Some(contacts) = self.model.contacts() else { return Ok(()) };
         match contacts.look_for(self.good, within) {
             Some(slot) => Err(NewtonFailure::Passes { slot: slot as usize }),

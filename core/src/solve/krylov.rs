@@ -65,7 +65,8 @@ const GROUP_SIZE: usize = 4;
 const LONG_PROJECTION: usize = 100;
 /// Relative change of eigenvalues between two projections at which they have converged
 const EIGENVALUE_TOLERANCE: f64 = 1e-11;
-/// The same of positive eigenvalues, which may be far from the largest
+/// Relative change between two projections at which positive eigenvalues have converged that are looked for first: they
+/// may be far from the largest, and are estimates
 const ONE_SIDED_TOLERANCE: f64 = 1e-8;
 /// The largest part of a positive eigenvalue that the next one is, if it is alone
 const NEXT_TO_ONE_ALONE: f64 = 0.5;

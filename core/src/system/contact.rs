@@ -47,7 +47,7 @@ pub struct ContactMemory {
     /// The number of steps of the shortest contact in the present dynamic stage, from the step with
     /// its first force to the last one; none if no contact has ended
     pub(crate) shortest: Option<u32>,
-    /// True if nothing was near to anything at the last converged state, and nothing rubs
+    /// True if nothing was near to anything at the last converged state, and nothing that is looked at rubs
     pub(crate) is_clear: bool,
     /// Contacts of each chain: a beam or a body against a surface
     pub(crate) chains: Arc<Vec<ChainMemory>>,
@@ -118,8 +118,8 @@ pub struct Clearance {
 }
 
 impl Clearance {
-    /// True if the ball does not meet the surface on the straight way to another place, either of the two lengthened
-    /// by `more`. The distance changes by no more than the centre moves, and the radius grows linearly.
+    /// True if the ball does not meet the surface on the way to another place, which is longer than the straight one by
+    /// `more`, a length, at most. The distance changes by no more than the centre moves, and the radius grows linearly.
     pub fn lasts_until(&self, end: &Self, more: f64) -> bool {
         let way = (end.middle - self.middle).norm() + more;
         let growth = end.reach - self.reach;
@@ -134,8 +134,8 @@ impl Clearance {
 pub struct ChainMemory {
     /// The points, in the order of their places
     pub(crate) points: Vec<PointMemory>,
-    /// The nodes as the surface saw them at the last converged state; empty without friction, and
-    /// before the first state
+    /// The nodes as the surface saw them at the last converged state at which the chain was looked at; empty without
+    /// friction, and before the first state
     pub(crate) nodes: Vec<NodeBefore>,
 }
 

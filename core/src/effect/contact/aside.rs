@@ -1,7 +1,7 @@
 //! Beams and bodies too far from a surface to touch it in the next step.
 //!
-//! They are put aside when a step ends, and not looked at in the next one. When that has ended its whole way
-//! is: where it may have come near the surface the step is taken again with a look at it.
+//! They are put aside when a step ends: in the next one nobody asks where they touch. When that step has ended, the
+//! way between its ends is looked at. If it may lead to the surface, the step is taken again, with contact there.
 
 use super::chain_now::before_of;
 use super::{Missed, SurfaceContacts};
@@ -31,18 +31,15 @@ impl SurfaceContacts {
     /// Puts aside in `to`, where a step has ended, what is far from its surface. Looks again in `from`, where it
     /// began, at what was put aside there and may have come near: the step is to be taken again.
     pub(super) fn put_aside(&self, from: &mut State, to: &mut State) -> Missed {
-        let mut clearances = self.clearances(to);
-        if let Some(slot) = self.look_for_missed(from, to, &clearances) {
+        let clearances = self.clearances(to);
+        if let Some(slot) = self.look_again(from, to, &clearances) {
             return Missed::Listed(slot);
         }
-        for (number, clearance) in clearances.iter_mut().enumerate() {
-            if from.contacts.clearance(number).is_none()
-                && clearance.is_some_and(|it| self.comes_soon(number, &it, from))
-            {
-                *clearance = None;
-            }
-        }
-        to.contacts.clearances = Arc::new(clearances);
+        let stays = |(number, clearance): (usize, Option<Clearance>)| {
+            let was_aside = from.contacts.clearance(number).is_some();
+            clearance.filter(|now| was_aside || !self.comes_soon(number, now, from))
+        };
+        to.contacts.clearances = Arc::new(clearances.into_iter().enumerate().map(stays).collect());
         Missed::None
     }
 
@@ -60,7 +57,7 @@ impl SurfaceContacts {
 
     /// Looks again in `from` at what is put aside there and may have come near to its surface on the way to a state
     /// with other clearances; a slot of the first such chain.
-    pub(super) fn look_for_missed(&self, from: &mut State, to: &State, after: &[Option<Clearance>]) -> Option<Slot> {
+    pub(super) fn look_again(&self, from: &mut State, to: &State, after: &[Option<Clearance>]) -> Option<Slot> {
         let came_near = |number: &usize| match (from.contacts.clearance(*number), &after[*number]) {
             (None, _) => false,
             (Some(_), None) => true,
@@ -73,16 +70,13 @@ impl SurfaceContacts {
         near.first().map(|&first| self.chains[first].nodes[0].node.u)
     }
 
-    /// Looks again at all chains that were put aside in an accepted state.
-    pub(super) fn look_at_all(&self, at: &mut State) {
-        let aside = |number: &usize| at.contacts.clearance(*number).is_some();
-        let numbers: Vec<usize> = (0..self.chains.len()).filter(aside).collect();
-        self.look_at(&numbers, at);
-        at.contacts.clearances = Arc::default();
+    /// The chains that are put aside in a state.
+    pub(super) fn aside(&self, at: &State) -> Vec<usize> {
+        (0..self.chains.len()).filter(|&number| at.contacts.clearance(number).is_some()).collect()
     }
 
     /// Looks again at some chains that were put aside in an accepted state.
-    fn look_at(&self, numbers: &[usize], at: &mut State) {
+    pub(super) fn look_at(&self, numbers: &[usize], at: &mut State) {
         let mut clearances = (*at.contacts.clearances).clone();
         let mut chains = (*at.contacts.chains).clone();
         chains.resize_with(self.chains.len(), Default::default);

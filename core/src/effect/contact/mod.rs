@@ -454,11 +454,12 @@ impl Contacts for SurfaceContacts {
 
     fn look_for(&self, from: &mut State, to: &State) -> Option<Slot> {
         let clearances = self.clearances(to);
-        self.look_for_missed(from, to, &clearances)
+        self.look_again(from, to, &clearances)
     }
 
     fn look_everywhere(&self, at: &mut State) {
-        self.look_at_all(at);
+        self.look_at(&self.aside(at), at);
+        at.contacts.clearances = Arc::default();
     }
 
     fn safe_part(&self, at: &State, increment: &[Vec3]) -> f64 {

@@ -18,9 +18,11 @@ const PROBE: f64 = 1e-5;
 /// Imaginary part up to which the distance of a critical load counts as real, relative to it; double ones come apart a
 /// little.
 const REAL: f64 = 1e-3;
-/// The same under unsymmetric tangents, which unequal meshes bring further apart.
+/// The imaginary part of a distance, relative to it, up to which it counts as real under unsymmetric tangents: unequal meshes
+/// bring double loads further apart there.
 const NEARLY_REAL: f64 = 1e-2;
-/// The same, relative to the critical load: from near by the distance itself is small.
+/// The imaginary part of a distance, relative to the critical load, up to which it counts as real under unsymmetric tangents: from
+/// near by the distance itself is small.
 const NEARLY_REAL_OF_LOAD: f64 = 1e-3;
 
 /// Two critical loads whose distances from the present load differ by less, relative to these, are a pair: those seen
@@ -154,7 +156,8 @@ impl TangentAtEnd {
 }
 
 impl VariedTangent {
-    /// The difference of both tangents, entry by entry: what makes it unsymmetric is not small beside it.
+    /// The difference of both tangents, which tells whether their change is symmetric: beside all of a tangent what is not
+    /// would be small.
     fn difference(&self) -> Vec<f64> {
         let [after, before] = self.ends.each_ref().map(|end| &end.values);
         after.iter().zip(before).map(|(after, before)| after - before).collect()

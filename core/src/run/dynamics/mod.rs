@@ -28,7 +28,7 @@ use std::f64::consts::PI;
 /// The smallest part in which a fixed step that fails is taken.
 const SMALLEST_PART: f64 = 1.0 / 64.0;
 
-/// Attempts at a step with more pairs of beams near each other, at most.
+/// Attempts at a step that looks at more pairs of beams, or at more surfaces, at most.
 const MOST_LISTS: usize = 4;
 
 /// What places are rounded by on the way through Newton's method, in lengths of the scene and radians: 1e4
@@ -348,7 +348,7 @@ impl Dynamics<'_, '_> {
         self.stage.refuse_passing()?;
         self.stage.refuse_missed()?;
         if let Some(middle) = &self.middle {
-            self.stage.refuse_missed_before(&middle.state)?;
+            self.stage.refuse_missed_within(&middle.state)?;
         }
         let StageRun { assembly, newton, state, good, .. } = &mut *self.stage;
         newton.end_step(&assembly.system, StepEnds { from: good, to: state }, &step, self.increments.as_ref());

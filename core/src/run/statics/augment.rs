@@ -57,7 +57,7 @@ const MANY_AUGMENTATIONS: usize = 3;
 /// Attempts at a level with a stiffer contact of beams, at most.
 const MOST_STIFFENINGS: usize = 2;
 
-/// Attempts at a level with more pairs of beams, at most.
+/// Attempts at a level that looks at more pairs of beams, or at more surfaces, at most.
 const MOST_LISTS: usize = 4;
 
 /// The way in which contacts become firmer from one balanced state to the next.
@@ -79,7 +79,7 @@ struct LevelAttempts {
     softened_stick: f64,
     /// Attempts with a stiffer contact of beams
     stiffenings: usize,
-    /// Attempts with more pairs of beams
+    /// Attempts that looked at more pairs of beams, or at more surfaces
     lists: usize,
     /// True if points that slid go on sliding in the first tangent
     goes_on: bool,
