@@ -323,6 +323,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
     let is_sprung = |spring: &&GroundSpring| spring.rotation != Mat3::ZERO;
+    let sizes = composition.sizes();
     let parts = ModelParts {
         names: mesh.names.clone(),
         multipliers: composition.multipliers,
@@ -333,6 +334,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         amplitudes: composition.amplitudes,
         supports: [supports, loose, composition.idle_multipliers].concat(),
         motions,
+        sizes,
         linear: !deck.effects.allow(deck::EffectWord::LargeRotations),
     };
     let mut model = parts.assemble(&mesh.nodes);

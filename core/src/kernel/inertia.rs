@@ -19,6 +19,14 @@ pub struct Inertia<T = f64> {
     pub about_node: Mat3<T>,
 }
 
+impl Inertia {
+    /// A length: the radius of gyration about the node or the centre line; zero without mass.
+    pub fn size(&self) -> f64 {
+        let [xx, yy, zz] = [0, 1, 2].map(|k| self.about_node.0[k][k]);
+        if self.mass > 0.0 { (0.5 * (xx + yy + zz) / self.mass).sqrt() } else { 0.0 }
+    }
+}
+
 impl Pack for Inertia {
     type Packed = Inertia<Lanes>;
 

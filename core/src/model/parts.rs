@@ -29,6 +29,8 @@ pub struct ModelParts {
     pub supports: Vec<Support>,
     /// Prescribed motions
     pub motions: Vec<Motion>,
+    /// Lengths of bodies: radii of gyration and of contact
+    pub sizes: Vec<f64>,
     /// True where static and dynamic stages are linear in the displacements
     pub linear: bool,
 }
@@ -36,6 +38,7 @@ pub struct ModelParts {
 impl ModelParts {
     /// The model on these nodes, whose slots are numbered without gaps, in space.
     pub fn assemble(self, nodes: &[PlacedNode]) -> Model {
+        let length = self.length_of(nodes);
         let Self { mut names, multipliers, elements, sprung, sprung_joints, .. } = self;
         let rotations: Vec<Slot> = nodes.iter().map(|node| node.node.p).collect();
         let slots = rotations.iter().map(|&slot| slot as usize + 1).max().unwrap_or(0);
@@ -61,22 +64,61 @@ impl ModelParts {
             motions: self.motions,
             plane: None,
             linear: self.linear,
-            length: diagonal(nodes.iter().map(|node| node.place)),
+            length,
         }
+    }
+
+    /// The length to which displacements are compared: how far apart nodes are, or the size of bodies where all nodes
+    /// are at one place, or 1.
+    fn length_of(&self, nodes: &[PlacedNode]) -> f64 {
+        let places: Vec<Vec3> = nodes.iter().map(|node| node.place).collect();
+        let bodies = || self.sizes.iter().copied().fold(0.0, f64::max);
+        let length = Some(extent(&places)).filter(|length| *length > 0.0).unwrap_or_else(bodies);
+        if length.is_finite() && length > 0.0 { length } else { 1.0 }
     }
 }
 
-/// The diagonal of the box around some places, or 1 where it has none: the length to which
-/// displacements are compared.
-fn diagonal(places: impl Iterator<Item = Vec3>) -> f64 {
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    for place in places {
-        for k in 0..3 {
-            low[k] = low[k].min(place.0[k]);
-            high[k] = high[k].max(place.0[k]);
+/// Looks for a place farther away from the last one.
+const MOST_LOOKS: usize = 8;
+
+/// The distance of two places that are the farthest from each other, or nearly so, found from the mean place on. Unlike
+/// the box around the places it does not depend on how the axes lie.
+fn extent(places: &[Vec3]) -> f64 {
+    let mean = places.iter().fold(Vec3::ZERO, |sum, place| sum + *place) * (1.0 / places.len().max(1) as f64);
+    let (mut from, mut length) = (mean, 0.0);
+    for look in 0..MOST_LOOKS {
+        let distance = |place: &Vec3| (*place - from).norm();
+        let Some(farthest) = places.iter().copied().max_by(|a, b| distance(a).total_cmp(&distance(b))) else { break };
+        let apart = distance(&farthest);
+        // The first look is from the mean.
+        if look > 0 && apart <= length {
+            break;
+        }
+        length = if look > 0 { apart } else { 0.0 };
+        from = farthest;
+    }
+    length
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_extent_is_that_of_the_farthest_places() {
+        let at = |x: f64, y: f64| Vec3([x, y, 0.0]);
+        assert_eq!(extent(&[]), 0.0);
+        assert_eq!(extent(&[at(3.0, 1.0); 2]), 0.0);
+        assert_eq!(extent(&[at(0.0, 0.0), at(1.0, 0.0), at(10.0, 0.0)]), 10.0);
+        // A frame has the diagonal of its box.
+        let frame = [at(0.0, 0.0), at(0.0, 3.0), at(4.0, 3.0), at(4.0, 0.0)];
+        assert_eq!(extent(&frame), 5.0);
+        // In any axes.
+        for angle in [0.3, 1.0, 2.4] {
+            let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+            let turned =
+                frame.map(|place| at(cos * place.0[0] - sin * place.0[1], sin * place.0[0] + cos * place.0[1]));
+            assert!((extent(&turned) - 5.0).abs() < 1e-14);
         }
     }
-    let diagonal = Vec3([0, 1, 2].map(|k| high[k] - low[k])).norm();
-    if diagonal.is_finite() && diagonal > 0.0 { diagonal } else { 1.0 }
 }

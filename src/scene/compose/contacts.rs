@@ -1,5 +1,6 @@
 //! Contacts of beams and bodies with surfaces, and of beams with beams.
 
+use super::contact_reason::reason_of;
 use super::{Composer, DrivenTable, stage_set};
 use crate::deck::{
     self, ContactDamping, ContactRadius, Deck, Diagnostic, EffectWord, EndsWord, SectionBody, Shape, Spanned, Stage,
@@ -37,9 +38,6 @@ const OF_EXTENSION: f64 = 1e-4;
 
 /// Steps that a contact in a dynamic stage lasts, at least.
 const STEPS_OF_CONTACT: f64 = 10.0;
-
-/// Pairs of beams that are named in the reason of contacts, at most.
-const NAMED_MEETINGS: usize = 6;
 
 const NAME: &str = "contact";
 const FRICTION: &str = "friction of contacts";
@@ -339,63 +337,6 @@ impl Composer<'_> {
             Some(self.stiffness_of(contact, beam, (number / beam.order).min(beam.elements.len() - 1)))
         })
     }
-}
-
-/// The reason of contacts, with what may touch what.
-fn reason_of(deck: &Deck, out: &SurfaceContacts) -> String {
-    let with_surfaces = deck.contacts.iter().filter(|contact| !contact.surfaces.is_empty());
-    let meets = |contact: &deck::Contact| {
-        let parties = listed(contact.beams.iter().chain(&contact.nodes));
-        format!("{parties} with {}", listed(contact.surfaces.iter()))
-    };
-    let mut parts: Vec<String> = with_surfaces.map(meets).take(NAMED_MEETINGS).collect();
-    let elements: usize = out.chains.iter().map(|chain| chain.elements()).sum();
-    if elements > 0 {
-        parts.push(format!("{elements} pair(s) of an element or a body with a surface in all"));
-    }
-    if !out.pairs.is_empty() {
-        let meets = |[a, b]: [&str; 2]| if a == b { format!("{a} with itself") } else { format!("{a} with {b}") };
-        let mut named: Vec<String> = out.pairs.names().take(NAMED_MEETINGS).map(meets).collect();
-        if out.pairs.len() > NAMED_MEETINGS {
-            named.push(format!("{} more pairs of beams", out.pairs.len() - NAMED_MEETINGS));
-        }
-        let named = named.join(", ");
-        let count = out.pairs.element_pairs();
-        parts.push(format!(
-            "{named}: {count} pair(s) of elements (not those near each other along a beam, or near a node that they \
-             share or a joint)"
-        ));
-    }
-    let idle = idle_names(deck);
-    if !idle.is_empty() {
-        parts.push(format!("no [[contact]] names {}", listed(idle.into_iter())));
-    }
-    format!("{} [[contact]] table(s): {}", deck.contacts.len(), parts.join("; "))
-}
-
-/// Names one after the other, the first of many.
-fn listed<'a>(names: impl Iterator<Item = &'a Spanned<String>>) -> String {
-    let names: Vec<&str> = names.map(|name| name.value.as_str()).collect();
-    let more = names.len().saturating_sub(NAMED_MEETINGS);
-    let shown = names[..names.len() - more].join(", ");
-    if more == 0 { shown } else { format!("{shown} and {more} more") }
-}
-
-/// Beams, bodies and surfaces that touch nothing, since no contact names them.
-fn idle_names(deck: &Deck) -> Vec<&Spanned<String>> {
-    let of_contact = |contact: &deck::Contact| {
-        let parties = [&contact.beams, &contact.nodes, &contact.with, &contact.surfaces].into_iter().flatten();
-        parties.map(|name| name.value.clone()).collect::<Vec<_>>()
-    };
-    let named: Vec<String> = deck.contacts.iter().flat_map(of_contact).collect();
-    let beams = deck.beams.iter().map(|beam| &beam.name);
-    let bodies = deck.bodies.iter().map(|body| &body.at);
-    // A body that carries a surface touches with that.
-    let carriers: Vec<&str> =
-        deck.surfaces.iter().filter_map(|surface| Some(surface.on.as_ref()?.value.as_str())).collect();
-    let bodies = bodies.filter(|body| !carriers.contains(&body.value.as_str()));
-    let surfaces = deck.surfaces.iter().map(|surface| &surface.name);
-    beams.chain(bodies).chain(surfaces).filter(|name| !named.contains(&name.value)).collect()
 }
 
 /// The shortest time step that dynamic stages of a deck begin with.

@@ -1,6 +1,7 @@
 //! Which effects act: for each table that stands in the deck one effect, and for each the reason.
 
 mod connections;
+mod contact_reason;
 mod contacts;
 mod fading;
 mod inertia;
@@ -84,6 +85,14 @@ pub struct Composition {
     pub(super) driven: Vec<DrivenTable>,
     /// The slots of the rotations on both sides of each of them
     pub(super) sprung_joints: Vec<[Option<Slot>; 2]>,
+}
+
+impl Composition {
+    /// Lengths of bodies: radii of gyration and of contact.
+    pub fn sizes(&self) -> Vec<f64> {
+        let of_contacts = self.contacts.iter().flat_map(|contacts| &contacts.chains).map(|chain| chain.strand.radius);
+        self.bodies.iter().map(|body| body.inertia.size()).chain(of_contacts).collect()
+    }
 }
 
 /// Tables with the same key share an amplitude: the history with its stages, and the stages of the
