@@ -433,3 +433,22 @@ fn bodies_on_columns_that_turn_have_their_two_modes() {
         }
     }
 }
+
+/// Beck's column beyond flutter with damping by stiffness, whose stiff modes creep: those with the smallest |s| are listed,
+/// whatever their frequencies are. Exponents by eight Hermite elements and a dense solver.
+#[test]
+fn slow_modes_beside_creeping_ones_are_listed() {
+    let text = "[point]\nroot = [0, 0, 0]\ntip = [1, 0, 0]\n[section.s]\nEA = 1e6\nGA = 1e6\nGJ = 1e3\nEI = [1.5, 1]\nrhoA = 1\n\
+                rhoJ = [0.001, 0, 0]\n[[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = 5\norder = 3\n\
+                [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [-22, 0, 0]\nframe = \"body\"\n\
+                [damping]\nstiffness = 0.02\n[[stage]]\nkind = \"static\"\nsteps = 2\n[[stage]]\nkind = \"modal\"\nmodes = MODES\n";
+    let expected = [(0.315, 7.781), (2.111, 8.714), (-7.176, 12.278), (-7.832, 19.081)];
+    for count in [4, 5, 6, 12] {
+        let found = exponents(&modes(&text.replace("MODES", &count.to_string())));
+        assert_eq!(found.len(), count, "{found:?}");
+        for (growth, omega) in expected {
+            let exponent = Complex::new(growth, omega);
+            assert!(found.iter().any(|s| (s - exponent).norm() < 2e-3 * exponent.norm()), "{exponent} in {found:?}");
+        }
+    }
+}

@@ -203,15 +203,14 @@ impl Modal<'_, '_> {
 /// behind them.
 fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
     let rigid = SmallMotion { exponent: Complex::default(), uncertainty: 0.0, shape: None };
-    let mut stable: Vec<SmallMotion> = found.motions.iter().filter(|motion| !grows(motion)).cloned().collect();
-    stable.extend(std::iter::repeat_n(rigid, found.rigid));
-    sort_by(&mut stable, |a, b| a.exponent.norm().total_cmp(&b.exponent.norm()));
-    stable.truncate(modes);
     let mut all: Vec<SmallMotion> =
-        found.motions.iter().filter(|motion| grows(motion)).cloned().chain(stable).collect();
-    sort(&mut all);
+        found.motions.iter().cloned().chain(std::iter::repeat_n(rigid, found.rigid)).collect();
+    sort_by(&mut all, |a, b| a.exponent.norm().total_cmp(&b.exponent.norm()));
     let is_listed = |(number, motion): &(usize, SmallMotion)| *number < modes || grows(motion);
-    all.into_iter().enumerate().filter(is_listed).map(|(_, motion)| motion).collect()
+    let mut listed: Vec<SmallMotion> =
+        all.into_iter().enumerate().filter(is_listed).map(|(_, motion)| motion).collect();
+    sort(&mut listed);
+    listed
 }
 
 fn mode(motion: &SmallMotion) -> Mode {
