@@ -656,3 +656,87 @@ fn rods_that_hit_flush_rebound() {
         assert!((energy - 1.0).abs() < 0.02, "{energy}");
     }
 }
+
+/// Two equal bars that cross in their middles exchange their velocities at any angle, wherever their nodes are: also at
+/// small angles with nodes so far apart that none touches, and where two nodes meet.
+#[test]
+fn bars_that_cross_at_small_angles_exchange_their_velocities() {
+    let mut random = Random::new(97);
+    for case in 0..24 {
+        let [along, normal] = random.axes();
+        let angle = random.range(0.5, 20.0).to_radians();
+        let across = along * angle.cos() + normal.cross(along) * angle.sin();
+        let [first_elements, second_elements] = [0, 1].map(|_| random.range(1.0, 8.99) as usize);
+        let order = 1 + case % 3;
+        let middle = normal * 0.037;
+        let bar = |direction: Vec3, middle: Vec3, elements: usize| Bar {
+            ends: [middle - direction * 0.5, middle + direction * 0.5],
+            elements: elements.div_ceil(order),
+            order,
+            radius: 0.017,
+        };
+        let velocity = normal * -0.7;
+        let Vec3([vx, vy, vz]) = velocity;
+        let deck = [
+            "[section.s]\nEA = 1e8\nGA = 1e8\nGJ = 1e6\nEI = 1e6\nrhoA = 1\nrhoJ = [1e-3, 5e-4, 5e-4]\n",
+            &bar(along, Vec3::ZERO, first_elements).deck("a"),
+            &bar(across, middle, second_elements).deck("b"),
+            &format!("[[initial]]\nbeam = \"b\"\nvelocity = [{vx}, {vy}, {vz}]\n"),
+            "[[contact]]\nname = \"c\"\nbeams = [\"a\"]\nwith = [\"b\"]\nradius = 0.017\nstiffness = 5e5\npenetration = 1e-3\n",
+            "[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 1e-4\n",
+            "[output]\nnodes = [\"a@start\", \"a@end\", \"b@start\", \"b@end\"]\ncolumns = [\"v\", \"contact\", \"energy\"]\n",
+        ];
+        let simulation = simulate(&deck.concat());
+        let speed = |beam: &str| {
+            let ends = ["start", "end"].map(|end| Vec3(simulation.vector(&format!("{beam}@{end}.v"))).dot(normal));
+            0.5 * (ends[0] + ends[1])
+        };
+        let (of_first, of_second) = (speed("a"), speed("b"));
+        let deepest = simulation.column("c.depth").into_iter().fold(0.0, f64::max);
+        let energy = simulation.end("energy.total");
+        let about = format!("case {case}, {first_elements} and {second_elements} elements at {angle}, order {order}");
+        println!("{about}: {of_first}, {of_second}, depth {deepest}, energy {energy}");
+        assert!((of_first + 0.7).abs() < 0.01 && of_second.abs() < 0.01, "{about}: {of_first}, {of_second}");
+        // v sqrt(m/(2 K)), less where several nodes touch.
+        assert!(deepest < 1.3 * 0.7 * (0.5f64 / 5e5).sqrt(), "{about}: {deepest}");
+        assert!((energy - 0.245).abs() < 0.01 * 0.245, "{about}: {energy}");
+    }
+}
+
+/// The end of a cantilever lies over another one near its end and is pressed down: in one level as in six. It does not go
+/// past the axis of the other one, where centre lines do not cross.
+#[test]
+fn ends_do_not_go_through_beams_in_one_level() {
+    let mut random = Random::new(98);
+    for case in 0..12 {
+        let beyond = random.range(0.0, 0.012);
+        let force = random.range(1.5, 6.0);
+        let angle = random.range(40.0, 90.0).to_radians();
+        let [x, y] = [0.8 * angle.cos(), -0.8 * angle.sin()];
+        let force_at = |steps: usize| {
+            let deck = [
+                "[section.s]\nEA = 5e4\nGA = 2e4\nGJ = 6\nEI = 7\n",
+                &Bar { ends: [Vec3([-1.1, 0.0, 0.0]), Vec3([0.3, 0.0, 0.0])], elements: 14, order: 1, radius: 0.02 }
+                    .deck("a"),
+                &Bar { ends: [Vec3([x, y, 0.043]), Vec3([0.0, beyond, 0.042])], elements: 8, order: 1, radius: 0.02 }
+                    .deck("b"),
+                "[[support]]\nat = \"a@start\"\nfix = \"all\"\n[[support]]\nat = \"b@start\"\nfix = \"all\"\n",
+                &format!("[[load]]\nat = \"b@end\"\nforce = [0, 0, -{force}]\n"),
+                "[[contact]]\nname = \"c\"\nbeams = [\"a\"]\nwith = [\"b\"]\nradius = 0.02\n",
+                &format!("[[stage]]\nkind = \"static\"\nsteps = {steps}\n"),
+                "[output]\nnodes = [\"b@end\"]\ncolumns = [\"u\", \"contact\"]\n",
+            ];
+            let simulation = attempt(&deck.concat());
+            // What slides off has a named error or another end.
+            simulation.result.is_ok().then(|| simulation.end("c.normal"))
+        };
+        let [at_once, in_six] = [1, 6].map(force_at);
+        println!("case {case}: {at_once:?}, {in_six:?}");
+        if let (Some(at_once), Some(in_six)) = (at_once, in_six) {
+            assert!(
+                (at_once - in_six).abs() < 1e-2 * in_six.max(0.1),
+                "case {case}: {at_once}, in six levels {in_six}"
+            );
+        }
+    }
+}

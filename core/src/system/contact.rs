@@ -44,6 +44,8 @@ pub struct ContactMemory {
     pub(crate) damping_power: f64,
     /// The largest penetration in the present dynamic stage, over the one that is allowed
     pub(crate) deepest: f64,
+    /// The same of beams with beams anywhere, also between the points that carry forces
+    pub(crate) deepest_between: f64,
     /// The number of steps of the shortest contact in the present dynamic stage, from the step with
     /// its first force to the last one; none if no contact has ended
     pub(crate) shortest: Option<u32>,
@@ -73,6 +75,7 @@ impl Default for ContactMemory {
             dissipated: 0.0,
             damping_power: 0.0,
             deepest: 0.0,
+            deepest_between: 0.0,
             shortest: None,
             is_clear: false,
             chains: Arc::default(),
@@ -206,6 +209,8 @@ pub struct PairsMemory {
     /// Unit tangents of all beams at their nodes at the last converged state (global axes); empty
     /// where no pair is listed
     pub(crate) directions: Arc<Vec<Vec3>>,
+    /// Places of the nodes of all beams at the last converged state; empty where no pair is listed
+    pub(crate) accepted: Arc<Vec<Vec3>>,
     /// Places of the nodes of all beams when the list was made; empty before the first list
     pub(crate) places: Arc<Vec<Vec3>>,
     /// The gap up to which pairs are in the list, a length

@@ -27,6 +27,8 @@ const PROPOSED_ERROR: f64 = 0.4;
 const LEAST_PART_OF_STEP: f64 = 0.1;
 /// The part of an imbalance from which on one reason explains most of it.
 const OWN_PART: f64 = 0.5;
+/// Penetrations between points with forces that are told, over those at such points, or over the allowed one.
+const MOST_HIDDEN: f64 = 2.0;
 /// Steps that a contact should last: with ten the rebound is within 0.4 %.
 const LEAST_STEPS_OF_CONTACT: u32 = 9;
 
@@ -87,6 +89,15 @@ impl Dynamics<'_, '_> {
         }
         let stage = self.stage.number + 1;
         let deepest = self.stage.state.contacts.deepest;
+        let between = self.stage.state.contacts.deepest_between;
+        if between > MOST_HIDDEN * deepest.max(1.0) {
+            let message = format!(
+                "stage {stage}: beams penetrate each other by up to {} times `penetration`, between the points that carry \
+                 forces: use more elements there",
+                two_digits(between)
+            );
+            self.stage.warn(WarningKind::HiddenPenetration, message);
+        }
         if deepest > 1.0 {
             // Penetrations of an impact fall with the root of the stiffness.
             let message = format!(

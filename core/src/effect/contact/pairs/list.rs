@@ -42,6 +42,7 @@ impl BeamPairs {
         let list = self.near(&places, margin);
         PairsMemory {
             directions: Arc::new(self.directions_of(&list, &places)),
+            accepted: Arc::new(if list.is_empty() { Vec::new() } else { places.clone() }),
             list: Arc::new(list),
             places: Arc::new(places),
             margin,
@@ -66,6 +67,7 @@ impl BeamPairs {
             memory.places = Arc::new(places.clone());
         }
         memory.directions = Arc::new(self.directions_of(&memory.list, &places));
+        memory.accepted = Arc::new(if memory.list.is_empty() { Vec::new() } else { places });
     }
 
     /// Adds to the list of `from` the pairs that may have met on the way to another state without
@@ -91,6 +93,7 @@ impl BeamPairs {
         list.extend(missed);
         list.sort_unstable();
         memory.directions = Arc::new(self.directions_of(&list, &before));
+        memory.accepted = Arc::new(before);
         memory.list = Arc::new(list);
         Missed::Listed(slot)
     }
@@ -217,10 +220,15 @@ impl BeamPairs {
 
     /// A bound of the gap of surfaces from below.
     pub(super) fn chord_gap(&self, pair: &ListedPair, places: &[Vec3]) -> f64 {
+        let [a, b] = self.both(pair.meeting as usize);
+        self.chord_distance(pair, places) - self.sags(pair, places) - a.radius - b.radius
+    }
+
+    /// The distance of the chords between neighbouring nodes of both elements.
+    pub(super) fn chord_distance(&self, pair: &ListedPair, places: &[Vec3]) -> f64 {
         let mut least = f64::INFINITY;
         self.each_chords(pair, places, &mut |_, segments| least = least.min(segments.closest().distance));
-        let [a, b] = self.both(pair.meeting as usize);
-        least - self.sags(pair, places) - a.radius - b.radius
+        least
     }
 
     /// How far both elements are from their chords at most, in sum.

@@ -7,10 +7,9 @@ use crate::effect::contact::predecessors::{LARGEST_SHIFT, Link, Predecessors, Re
 use crate::effect::contact::strand::ContactStiffness;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::{
-    CarriedTraction, ContactNode, NodeBefore, PairLaw, PairSide, PointState, ShapeAt, add_pair,
+    CarriedTraction, ContactNode, NodeTurning, PairLaw, PairSide, PointState, ShapeAt, add_pair,
 };
 use crate::kernel::{ElementSystem, Weights};
-use crate::rotation::Rotation;
 use crate::system::{ContactRegime, ListedPair, PairPointKind, PairPointMemory, PointMemory, State};
 use crate::tensor::{Mat3, Vec3};
 use std::borrow::Cow;
@@ -84,6 +83,8 @@ pub(super) struct PairsNow<'a> {
     pub(super) places: Vec<Vec3>,
     /// Directions of the beams at all nodes at the last converged state, or of now where it has none
     pub(super) directions: Cow<'a, [Vec3]>,
+    /// Places of all nodes at the last converged state, or of now where it has none
+    pub(super) accepted: Cow<'a, [Vec3]>,
 }
 
 /// Calls a function of two numbers of nodes, for elements of given orders.
@@ -115,7 +116,12 @@ impl<'a> PairsNow<'a> {
         } else {
             Cow::Owned(pairs.directions(&places))
         };
-        Self { pairs, laws, at, list, places, directions }
+        let accepted = if known.accepted.len() == places.len() {
+            Cow::Borrowed(&known.accepted[..])
+        } else {
+            Cow::Owned(places.clone())
+        };
+        Self { pairs, laws, at, list, places, directions, accepted }
     }
 
     /// Visits the points of all pairs that act, with their systems.
@@ -167,6 +173,7 @@ impl<'a> PairsNow<'a> {
                 found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
             }
         }
+        self.share_among_near(&mut found);
         found
     }
 
@@ -322,7 +329,7 @@ impl<'a> PairsNow<'a> {
         let mut shapes = [[0.0; 4]; 2];
         shapes[0][..NA].copy_from_slice(&a.shape.values);
         shapes[1][..NB].copy_from_slice(&b.shape.values);
-        let carrier = b.nodes[law.carrier].rotation.r;
+        let carrier = b.turning.map_or(Mat3::IDENTITY, |turning| turning[law.carrier].rotation.r);
         let place = a.place();
         Some(PairPoint {
             number,
@@ -344,17 +351,15 @@ impl<'a> PairsNow<'a> {
     fn pair_side<const N: usize>(&self, pair: &ListedPair, side: usize, at: f64, law: &PairLaw) -> PairSide<N> {
         let nodes = self.pairs.nodes_of(pair)[side];
         let node = |i: usize| {
-            let node = &nodes[i];
-            let place = node.place + self.at.q[node.node.u as usize];
-            let velocity = self.at.v[node.node.u as usize];
-            if law.friction.is_none() {
-                let before = NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY };
-                return ContactNode { place, velocity, rotation: Rotation::new(Vec3::ZERO), before };
-            }
-            let before = self.before(pair, law.carrier, [side, i]);
-            ContactNode { place, velocity, rotation: self.at.rotation(node.node.p), before }
+            let slot = nodes[i].node.u as usize;
+            ContactNode { place: nodes[i].place + self.at.q[slot], velocity: self.at.v[slot] }
         };
-        PairSide { nodes: std::array::from_fn(node), shape: ShapeAt::new(at) }
+        let turning = |i: usize| {
+            let before = self.before(pair, law.carrier, [side, i]);
+            NodeTurning { rotation: self.at.rotation(nodes[i].node.p), before }
+        };
+        let turning = law.friction.map(|_| std::array::from_fn(turning));
+        PairSide { nodes: std::array::from_fn(node), turning, shape: ShapeAt::new(at) }
     }
 
     /// The memory of a point with a force. Before a state is accepted, traction and normal remain

@@ -183,6 +183,20 @@ impl<'a> PairRole<'a> {
         deepest
     }
 
+    /// The deepest penetration of beams anywhere, over the one that is allowed; zero without one.
+    fn deepest_over_allowed(self, at: &State) -> f64 {
+        let now = self.now(at);
+        let mut deepest = 0.0f64;
+        for pair in now.list.iter().filter(|pair| self.acts(pair, at)) {
+            let allowed = self.law_of(pair.meeting).penetration;
+            let may_be_deepest = -self.pairs.chord_gap(pair, &now.places) > deepest * allowed;
+            if may_be_deepest {
+                deepest = deepest.max(-now.gap(pair) / allowed);
+            }
+        }
+        deepest
+    }
+
     fn penetration_of(self, (pair, depth): (ListedPair, f64)) -> Penetration {
         let laws = self.law_of(pair.meeting);
         let second = self.pairs.meetings[pair.meeting as usize].strands[1];
@@ -211,10 +225,18 @@ impl<'a> PairRole<'a> {
             return None;
         }
         let [before, after] = [from, to].map(|at| self.pairs.places(at));
-        // A fast approach from far away may come near, but for a tenth of the distance in contact.
         let passes = |pair: &&ListedPair| {
             let [a, b] = self.pairs.both(pair.meeting as usize);
-            self.pairs.least_part(pair, &before, &after, [0.0, a.radius + b.radius]) < 1.0
+            let touching = a.radius + b.radius;
+            // A fast approach from far away may come near, but for a tenth of the distance in contact.
+            if self.pairs.least_part(pair, &before, &after, [0.0, touching]) < 1.0 {
+                return true;
+            }
+            // An end may go past the other centre line: whoever was deeper on the way by half of that distance has gone
+            // through material.
+            let apart = [&before, &after].map(|places| self.pairs.chord_distance(pair, places));
+            let least = apart[0].min(apart[1]).min(touching) - 0.5 * touching;
+            least > 0.0 && self.pairs.least_part(pair, &before, &after, [least, f64::INFINITY]) < 1.0
         };
         list.iter().filter(|pair| self.acts(pair, to)).find(passes).map(|pair| self.slot_of(pair))
     }
@@ -261,8 +283,10 @@ impl<'a> PairRole<'a> {
             }
         });
         let ended = known.iter().zip(&stays).filter(|(_, stays)| !**stays).map(|(point, _)| point.point.steps);
+        let hidden = self.deepest_over_allowed(at);
         let contacts = &mut at.contacts;
         contacts.deepest = contacts.deepest.max(deepest);
+        contacts.deepest_between = contacts.deepest_between.max(hidden);
         contacts.shortest = contacts.shortest.into_iter().chain(ended.filter(|&steps| steps > 0)).min();
     }
 

@@ -2,10 +2,12 @@
 //!
 //! Where beams cross, closest points carry it; where they are side by side, the nodes of both; in
 //! between, both. The angle is that of directions at the nodes, linear along the elements, so that
-//! a point that passes from one element to the next keeps its share.
+//! a point that passes from one element to the next keeps its share. Beams that cross at a small angle, with nodes
+//! farther apart than they are thick, cross between nodes that do not touch: closest points carry the
+//! force there, too.
 
 use super::candidate::{AT_NODE, Kinds, PairCandidate};
-use super::point::PairsNow;
+use super::point::{Found, PairsNow};
 use super::{BeamPairs, ElementOf};
 use crate::kernel::contact::ShapeAt;
 use crate::kernel::contact::along::weighted_sum;
@@ -26,6 +28,15 @@ const SMALLEST_OFFSET: f64 = 0.05;
 
 /// The offset from which on closest points carry all of the force.
 const LARGEST_OFFSET: f64 = 0.15;
+
+/// The same in dynamic stages, whose penalties share the force: gaps between nodes and of nodes differ by 1.1 % of the
+/// sum of radii where closest points carry all of it. Only the angle across the normal counts, since beams that come
+/// down on each other at an angle touch at nodes.
+const OFFSETS_OF_PENALTY: [f64; 2] = [0.1, 0.3];
+
+/// Closest points that are nearer to each other than the first part of the sum of radii are one contact, those farther
+/// than the second part are two.
+const ONE_CONTACT: [f64; 2] = [0.25, 0.5];
 
 /// The cosine of the angle between a kink and a point up to which the point is beside the kink,
 /// neither inside nor outside.
@@ -78,6 +89,53 @@ impl PairsNow<'_> {
         candidates
     }
 
+    /// Where two kinks cross, up to four pairs of elements have closest points, and the nodes one more. Penalties of
+    /// those that are near each other act as one: together they have no more than the force of one.
+    pub(super) fn share_among_near(&self, found: &mut [Found]) {
+        if self.at.contacts.regime == ContactRegime::Augmented {
+            return;
+        }
+        let closest = |found: &Found| found.candidate.kind == PairPointKind::Closest;
+        let numbers: Vec<usize> = (0..found.len()).filter(|&i| closest(&found[i])).collect();
+        if numbers.len() < 2 {
+            return;
+        }
+        let places: Vec<[Vec3; 2]> = numbers.iter().map(|&i| self.places_of(&found[i])).collect();
+        let mut sums = vec![0.0; numbers.len()];
+        for (i, &own) in numbers.iter().enumerate() {
+            sums[i] += found[own].candidate.weight;
+            let pair = self.list[found[own].number];
+            let strands = self.pairs.both(pair.meeting as usize);
+            let radii = strands[0].radius + strands[1].radius;
+            let along = |number: usize| f64::from(self.list[found[number].number].elements[0]);
+            for (j, &other) in numbers.iter().enumerate().skip(i + 1) {
+                // They are in the order of the first beam, which may be a ring.
+                if strands[0].shift(along(own), along(other)) > 1.0 {
+                    if strands[0].is_closed() {
+                        continue;
+                    }
+                    break;
+                }
+                let apart = (0..2).map(|side| (places[i][side] - places[j][side]).norm()).fold(0.0, f64::max);
+                let near = 1.0 - smooth_part(apart, ONE_CONTACT.map(|part| part * radii));
+                sums[i] += near * found[other].candidate.weight;
+                sums[j] += near * found[own].candidate.weight;
+            }
+        }
+        for (&number, sum) in numbers.iter().zip(sums) {
+            let Found { number: pair, candidate } = &mut found[number];
+            // Nodes have the rest.
+            let whole = self.share_by_angle(&self.list[*pair], candidate);
+            candidate.weight /= f64::max(sum / whole, 1.0);
+        }
+    }
+
+    /// The places of a candidate on both centre lines.
+    fn places_of(&self, Found { number, candidate }: &Found) -> [Vec3; 2] {
+        let elements = self.pairs.elements_of(&self.list[*number]);
+        [0, 1].map(|side| self.place_and_slope(elements[side], candidate.at[side])[0])
+    }
+
     /// The kinds of points that a pair may have, by the angles between its elements.
     fn kinds_of(&self, pair: &ListedPair) -> Kinds {
         let directions = self.pairs.elements_of(pair).map(|of| self.pairs.of_element(of, &self.directions));
@@ -85,9 +143,14 @@ impl PairsNow<'_> {
         let spread = |side: usize| directions[side].iter().map(|node| angle(*node, middles[side])).fold(0.0, f64::max);
         let spreads = spread(0) + spread(1);
         let middle = angle_of_lines(middles[0], middles[1]);
+        let least_sine = match self.at.contacts.regime {
+            ContactRegime::Augmented => sine(middle - spreads),
+            // That across the normal is not known here.
+            ContactRegime::Penalty => 0.0,
+        };
         Kinds {
-            closest: self.part_of_closest(pair, middle + spreads) > 0.0,
-            nodes: self.part_of_closest(pair, middle - spreads) < 1.0,
+            closest: self.part_of_closest(pair, middle + spreads, sine(middle + spreads)) > 0.0,
+            nodes: self.part_of_closest(pair, middle - spreads, least_sine) < 1.0,
         }
     }
 
@@ -95,9 +158,14 @@ impl PairsNow<'_> {
     /// Multipliers close the gap of each point whatever its weight, which only makes its stiffness
     /// smaller: a point of small weight would take many augmentations.
     fn share_by_angle(&self, pair: &ListedPair, candidate: &PairCandidate) -> f64 {
-        let [a, b] = self.pairs.elements_of(pair);
-        let [a, b] = [self.direction(a, candidate.at[0]), self.direction(b, candidate.at[1])];
-        let closest = self.part_of_closest(pair, angle_of_lines(a, b));
+        let elements = self.pairs.elements_of(pair);
+        let [a, b] = [0, 1].map(|side| self.direction(elements[side], candidate.at[side]));
+        let angle = angle_of_lines(a, b);
+        let sine = match self.at.contacts.regime {
+            ContactRegime::Augmented => sine(angle),
+            ContactRegime::Penalty => self.sine_across(elements, candidate, [a, b]),
+        };
+        let closest = self.part_of_closest(pair, angle, sine);
         let part = match candidate.kind {
             PairPointKind::Closest => closest,
             PairPointKind::NodeOfFirst | PairPointKind::NodeOfSecond => 1.0 - closest,
@@ -108,23 +176,42 @@ impl PairsNow<'_> {
         }
     }
 
+    /// The sine of the angle between both beams across the normal of a candidate in the last accepted state, so
+    /// that it does not change within a step. `directions`: of both beams there.
+    fn sine_across(&self, elements: [ElementOf; 2], candidate: &PairCandidate, directions: [Vec3; 2]) -> f64 {
+        let [a, b] = directions.map(|direction| direction.normalized().unwrap_or(Vec3::ZERO));
+        let both = a.cross(b);
+        let [on_a, on_b] = [0, 1]
+            .map(|side| place_and_slope(self.pairs.of_element(elements[side], &self.accepted), candidate.at[side])[0]);
+        let apart = on_a - on_b;
+        // The foot of a node is the point of the other beam that is nearest to it.
+        let across = |along: Vec3| apart - along * apart.dot(along);
+        let normal = match candidate.free {
+            [true, true] => both,
+            [true, false] => across(a),
+            [false, true] | [false, false] => across(b),
+        };
+        normal.normalized().map_or(0.0, |normal| both.dot(normal).abs())
+    }
+
     /// The part of the force that closest points carry at an angle between both beams: all of it
-    /// where they cross, none where they are side by side. In static stages also by how far the
-    /// angle takes neighbouring nodes across the other beam.
-    fn part_of_closest(&self, pair: &ListedPair, angle: f64) -> f64 {
+    /// where they cross, none where they are side by side. Also by how far the angle takes
+    /// neighbouring nodes across the other beam, by its `sine`.
+    fn part_of_closest(&self, pair: &ListedPair, angle: f64, sine: f64) -> f64 {
         let by_angle = smooth_part(angle, [SIDE_BY_SIDE, CROSSING]);
         let strands = self.pairs.both(pair.meeting as usize);
+        // Of undeformed elements: what acts does not change with their stretch in an iteration.
+        let between_nodes =
+            [0, 1].map(|side| strands[side].element_length(pair.elements[side] as usize) / strands[side].order as f64);
+        let offset = between_nodes[0].min(between_nodes[1]) * sine / (strands[0].radius + strands[1].radius);
         // The closest points of curved elements side by side may part into two.
         let is_straight = strands.iter().all(|strand| strand.order == 1);
         match self.at.contacts.regime {
             ContactRegime::Augmented if is_straight => {
-                // Of undeformed elements: what acts does not change with their stretch in an iteration.
-                let of_side = |side: usize| strands[side].element_length(pair.elements[side] as usize);
-                let across = of_side(0).min(of_side(1)) * libm::sin(angle.clamp(0.0, FRAC_PI_2));
-                let offset = across / (strands[0].radius + strands[1].radius);
                 by_angle.max(smooth_part(offset, [SMALLEST_OFFSET, LARGEST_OFFSET]))
             }
-            ContactRegime::Augmented | ContactRegime::Penalty => by_angle,
+            ContactRegime::Augmented => by_angle,
+            ContactRegime::Penalty => by_angle.max(smooth_part(offset, OFFSETS_OF_PENALTY)),
         }
     }
 
@@ -249,6 +336,11 @@ fn place_and_slope(nodes: &[Vec3], s: f64) -> [Vec3; 2] {
         3 => sums::<3>(nodes, s),
         _ => sums::<4>(nodes, s),
     }
+}
+
+/// The sine of an angle, up to a right one.
+fn sine(angle: f64) -> f64 {
+    libm::sin(angle.clamp(0.0, FRAC_PI_2))
 }
 
 /// The angle between two vectors.
