@@ -1,5 +1,5 @@
 //! Microseconds per element and Newton iteration, split into evaluation, assembly and solve, for chains of 10 to 100,000
-//! elements in statics and dynamics.
+//! elements in statics and dynamics; then what points in contact and lists of near elements cost.
 //!
 //! `cargo bench --bench scaling` prints the table; `-- --smoke` runs the small sizes only, `-- --elements 10000,1000000` these.
 
@@ -148,6 +148,93 @@ fn row(elements: usize, dynamic: bool, interpolation: &str) {
     );
 }
 
+/// What a beam lies on with all its nodes, a little inside.
+const GROUNDS: [&str; 3] = ["plane", "cylinder", "beam"];
+
+/// The section and the beam `b` along a path, held at its start.
+fn held_beam(path: &str, start: &str, elements: usize) -> String {
+    format!(
+        "[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\n[[beam]]\nname = \"b\"\nsection = \"s\"\n{path}\n\
+         elements = {elements}\n[[support]]\nat = {start}\nfix = \"all\"\n[[stage]]\nkind = \"static\"\nsteps = 1\n"
+    )
+}
+
+/// A beam that lies on something, and the contact of both.
+fn deck_in_contact(elements: usize, on: &str, friction: f64) -> [String; 2] {
+    let straight = held_beam("through = [[0, 0, 0], [10, 0, 0]]", "[0, 0, 0]", elements);
+    let (scene, parties) = match on {
+        "plane" => (
+            format!(
+                "{straight}[[surface]]\nname = \"f\"\nkind = \"plane\"\npoint = [0, 0, -0.0099999]\nnormal = [0, 0, 1]\n"
+            ),
+            "beams = [\"b\"]\nsurfaces = [\"f\"]",
+        ),
+        "cylinder" => (
+            held_beam("arc = [[-5, 0, 0], [0, 0, 5], [5, 0, 0]]", "[-5, 0, 0]", elements)
+                + "[[surface]]\nname = \"f\"\nkind = \"cylinder\"\nfrom = [0, -1, 0]\nto = [0, 1, 0]\nradius = 4.9900001\n",
+            "beams = [\"b\"]\nsurfaces = [\"f\"]",
+        ),
+        "beam" => (
+            format!(
+                "{straight}[[beam]]\nname = \"under\"\nsection = \"s\"\nthrough = [[0, 0, -0.0199999], [10, 0, -0.0199999]]\n\
+                 elements = {elements}\n"
+            ),
+            "beams = [\"b\"]\nwith = [\"under\"]",
+        ),
+        other => panic!("nothing is called {other}"),
+    };
+    [scene, format!("[[contact]]\nname = \"c\"\n{parties}\nradius = 0.01\nfriction = {friction}\n")]
+}
+
+/// Seconds of one evaluation of force and tangent, and of force alone, of a static stage at rest, where contacts have
+/// found their points before.
+fn evaluation_seconds(deck: &str) -> [f64; 2] {
+    let (scene, _) = scene::from_text(deck).unwrap_or_else(|_| panic!("the deck is good"));
+    let model = scene.plan.model;
+    let mut state = model.rest();
+    state.amplitude.fill(1.0);
+    if let Some(contacts) = model.contacts() {
+        contacts.list_pairs(&mut state);
+        contacts.augment(&mut state);
+    }
+    let dof_map = Schedule::new(&model).begin_stage(&model, 0, StageKind::Static, &state);
+    let dof_map = dof_map.unwrap_or_else(|_| panic!("the stage is good"));
+    let stage = StageContext { number: 0, kind: StageKind::Static, rotating: false };
+    let mut assembly = Assembly::about(&state, &stage, dof_map, &model);
+    [Weights::STIFFNESS, Weights::NONE].map(|weights| quickest(|| assembly.evaluate(&state, weights, None)))
+}
+
+/// What points in contact cost in an evaluation, in nanoseconds a point.
+fn contact_row(elements: usize, on: &str, friction: f64) {
+    let [scene, contact] = deck_in_contact(elements, on, friction);
+    let [without, with] = [scene.clone(), scene + &contact].map(|deck| evaluation_seconds(&deck));
+    // Both beams have nodes that touch.
+    let points = if on == "beam" { 2 * elements } else { elements };
+    print!("{on:<9} {friction:>8} {points:>9}");
+    for (with, without) in with.into_iter().zip(without) {
+        print!(" {:>9.0}", 1e9 * (with - without) / points as f64);
+    }
+    println!();
+}
+
+/// Milliseconds for the list of near elements of a coil of wire whose turns lie close together.
+fn list_row(elements: usize) {
+    let turns = elements / 40;
+    let helix =
+        format!("helix = {{ start = [1, 0, 0], centre = [0, 0, 0], axis = [0, 0, 1], turns = {turns}, pitch = 0.11 }}");
+    let contact = "[[contact]]\nname = \"c\"\nbeams = [\"b\"]\nself = true\nradius = 0.05\n";
+    let deck = held_beam(&helix, "[1, 0, 0]", elements) + contact;
+    let (scene, _) = scene::from_text(&deck).unwrap_or_else(|_| panic!("the deck is good"));
+    let model = scene.plan.model;
+    let Some(contacts) = model.contacts() else { panic!("the coil touches itself") };
+    let mut state = model.rest();
+    let seconds = quickest(|| {
+        state.contacts.pairs = Default::default();
+        contacts.list_pairs(&mut state);
+    });
+    println!("{elements:>8} {:>9} {:>9.2}", state.contacts.pairs.list.len(), 1e3 * seconds);
+}
+
 /// The numbers of elements that are asked for.
 fn sizes() -> Vec<usize> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -181,4 +268,14 @@ fn main() {
         // Parts of ten elements are over before a clock ticks often enough.
         sizes.iter().filter(|&&elements| elements > 10).for_each(|&elements| parts(elements, dynamic, interpolation));
     }
+    let largest = sizes.iter().copied().max().unwrap_or_default();
+    let in_contact = largest.min(1_000);
+    println!("\npoints in contact, nanoseconds per point");
+    println!("{:<9} {:>8} {:>9} {:>9} {:>9}", "on", "friction", "points", "tangent", "force");
+    for (on, friction) in GROUNDS.into_iter().flat_map(|on| [(on, 0.0), (on, 0.3)]) {
+        contact_row(in_contact, on, friction);
+    }
+    println!("\nlists of near elements of a coil, milliseconds");
+    println!("{:>8} {:>9} {:>9}", "elements", "listed", "list");
+    list_row(largest.min(20_000));
 }

@@ -13,7 +13,7 @@ use super::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
 use super::strand::{ChainNode, Strand};
 use super::surface::SceneSurface;
 use crate::kernel::MAX_NODES;
-use crate::kernel::contact::along::weighted_sum;
+use crate::kernel::contact::along::{intervals_of_convex, weighted_sum};
 use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
 use crate::system::{ChainMemory, Clearance, ContactRegime, PointMemory, State};
 use crate::tensor::Vec3;
@@ -214,16 +214,22 @@ impl Chain {
         let mut first = 0;
         // A ring goes on at its start.
         let goes_round = self.is_closed();
+        let point_is_node: Vec<bool> = points.iter().map(|point| self.is_node(point.place)).collect();
         for (number, candidate) in candidates.iter().enumerate() {
             let along = candidate.along();
             while !goes_round && first < points.len() && points[first].place < along - LARGEST_SHIFT {
                 first += 1;
             }
+            let is_node = self.is_node(along);
             let may_be_near = |point: &&PointMemory| goes_round || point.place <= along + LARGEST_SHIFT;
             for (own, point) in (first..).zip(points[first..].iter().take_while(may_be_near)) {
                 let shift = self.shift(point.place, along);
                 if shift <= LARGEST_SHIFT {
-                    let relation = self.relation(point, candidate);
+                    let are_alike = match (point_is_node[own], is_node) {
+                        (true, true) => shift < ROUNDED_PLACE,
+                        (before, now) => before == now,
+                    };
+                    let relation = relation(point, candidate, are_alike);
                     links.push(Link { candidate: number, point: own, relation, shift });
                 }
             }
@@ -231,30 +237,27 @@ impl Chain {
         Predecessors::of(links, candidates.len(), points.len())
     }
 
-    /// The relation of a point in memory and a candidate, by what they touch and what they are: both at the
-    /// same node, or both between nodes.
-    fn relation(&self, before: &PointMemory, now: &Candidate) -> Relation {
-        let in_nodes = |along: f64| along * self.order as f64;
-        let is_node = |along: f64| (in_nodes(along) - in_nodes(along).round()).abs() < ROUNDED_PLACE;
-        let are_alike = match (is_node(before.place), is_node(now.along())) {
-            (true, true) => self.shift(before.place, now.along()) < ROUNDED_PLACE,
-            (before, now) => before == now,
-        };
-        match (before.edge, now.edge) {
-            (before, now) if before == now && are_alike => Relation::Same,
-            (Some(_), Some(_)) => Relation::OtherEdge,
-            _ => Relation::OtherFeature,
-        }
+    /// True for a place along the chain, in elements, at a node.
+    fn is_node(&self, along: f64) -> bool {
+        let in_nodes = along * self.order as f64;
+        (in_nodes - in_nodes.round()).abs() < ROUNDED_PLACE
+    }
+}
+
+/// The relation of a point in memory and a candidate, by what they touch. `are_alike`: both at the same node, or both
+/// between nodes.
+fn relation(before: &PointMemory, now: &Candidate, are_alike: bool) -> Relation {
+    match (before.edge, now.edge) {
+        (before, now) if before == now && are_alike => Relation::Same,
+        (Some(_), Some(_)) => Relation::OtherEdge,
+        (Some(_) | None, Some(_) | None) => Relation::OtherFeature,
     }
 }
 
 impl SeenChain<'_> {
     fn candidates(&mut self) -> Vec<Candidate> {
         let count = self.chain.elements();
-        let mut is_near = vec![false; count];
-        for k in self.remembered() {
-            is_near[k] = true;
-        }
+        let mut is_near = self.remembered();
         let mut candidates = Vec::new();
         for k in 0..count {
             is_near[k] = is_near[k] || !self.is_free(k);
@@ -268,16 +271,21 @@ impl SeenChain<'_> {
         candidates
     }
 
-    /// The elements beside points that had a force.
-    fn remembered(&self) -> Vec<usize> {
-        let count = self.chain.elements() as isize;
+    /// True for elements beside points that had a force.
+    fn remembered(&self) -> Vec<bool> {
+        let count = self.chain.elements();
+        let mut is_beside = vec![false; count];
         let is_closed = self.chain.is_closed();
-        let element = |k: isize| if is_closed { k.rem_euclid(count) } else { k.clamp(0, count - 1) };
-        let beside = |place: f64| {
-            let [from, to] = [-LARGEST_SHIFT, LARGEST_SHIFT].map(|shift| (place + shift).floor() as isize);
-            (from..=to).map(|k| element(k) as usize)
-        };
-        self.points.iter().flat_map(|point| beside(point.place)).collect()
+        let last = count as isize - 1;
+        for point in self.points {
+            let [from, to] = [-LARGEST_SHIFT, LARGEST_SHIFT].map(|shift| (point.place + shift).floor() as isize);
+            if is_closed {
+                (from..=to).for_each(|k| is_beside[k.rem_euclid(count as isize) as usize] = true);
+            } else {
+                is_beside[from.clamp(0, last) as usize..=to.clamp(0, last) as usize].fill(true);
+            }
+        }
+        is_beside
     }
 
     fn places_of(&self, k: usize) -> &[Vec3] {
@@ -324,11 +332,25 @@ impl SeenChain<'_> {
         (least < 0.0).then_some(least)
     }
 
-    fn minima(&self, k: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> Minima {
-        match self.places_of(k) {
-            [a, b] => minima(&[*a, *b], distance),
-            [a, b, c] => minima(&[*a, *b, *c], distance),
-            [a, b, c, d] => minima(&[*a, *b, *c, *d], distance),
+    /// The closest points of element `k` to the whole surface.
+    fn minima(&self, k: usize) -> Minima {
+        fn of<const N: usize>(surface: &Surface, nodes: [Vec3; N]) -> Minima {
+            minima(&nodes, surface.intervals(&nodes), &|y| surface.distance(y).ok())
+        }
+        match *self.places_of(k) {
+            [a, b] => of(self.surface, [a, b]),
+            [a, b, c] => of(self.surface, [a, b, c]),
+            [a, b, c, d] => of(self.surface, [a, b, c, d]),
+            _ => Minima::default(),
+        }
+    }
+
+    /// The closest points of element `k` to an edge with this distance.
+    fn minima_to_edge(&self, k: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> Minima {
+        match *self.places_of(k) {
+            [a, b] => minima(&[a, b], intervals_of_convex(2), distance),
+            [a, b, c] => minima(&[a, b, c], intervals_of_convex(3), distance),
+            [a, b, c, d] => minima(&[a, b, c, d], intervals_of_convex(4), distance),
             _ => Minima::default(),
         }
     }
@@ -381,7 +403,7 @@ impl SeenChain<'_> {
 
     /// The places of all closest points between the ends of element `k`.
     fn closest(&self, k: usize) -> Vec<Vec3> {
-        let of_surface = self.minima(k, &|y| self.surface.distance(y).ok());
+        let of_surface = self.minima(k);
         let of_edges = self.closest_to_edges(k).into_iter().map(|candidate| candidate.s);
         of_surface.found().iter().map(|minimum| minimum.s).chain(of_edges).map(|s| self.place(k, s)).collect()
     }
@@ -394,7 +416,7 @@ impl SeenChain<'_> {
             return;
         }
         let distance = |y: Vec3| self.surface.distance(y).ok();
-        for &Minimum { s, kind } in self.minima(k, &distance).found() {
+        for &Minimum { s, kind } in self.minima(k).found() {
             let place = match kind {
                 MinimumKind::Sharp => Place::Closest,
                 MinimumKind::Kink if self.surface.side == Side::Outside => Place::Fixed,
@@ -445,7 +467,7 @@ impl SeenChain<'_> {
             };
             let at = |s: f64, place: Place, weight: f64| Candidate { element: k, s, place, edge: Some(number), weight };
             let distance = |y: Vec3| edge.distance(y).ok();
-            let minima = self.minima(k, &distance);
+            let minima = self.minima_to_edge(k, &distance);
             let smooth = minima.found().iter().filter(|minimum| minimum.kind != MinimumKind::Kink);
             let beside = smooth.filter(|minimum| is_beside(minimum.s));
             found.extend(beside.map(|minimum| at(minimum.s, Place::Closest, self.weight(k, &distance))));

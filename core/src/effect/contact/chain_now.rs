@@ -5,9 +5,8 @@ use super::laws::ContactLaws;
 use super::predecessors::Predecessors;
 use super::strand::ChainNode;
 use super::surface::{SceneSurface, SurfaceCarrier};
-use crate::kernel::contact::{Carrier, ContactLaw, ContactNode, NodeBefore, PointState, add_point};
+use crate::kernel::contact::{Carrier, ContactLaw, ContactNode, NodeBefore, NodeTurning, PointState, add_point};
 use crate::kernel::{ElementSystem, Weights};
-use crate::rotation::Rotation;
 use crate::system::{ChainMemory, ContactRegime, PointMemory, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 
@@ -30,8 +29,8 @@ pub(super) struct PointNow<'a> {
     pub(super) predecessors: &'a Predecessors,
     /// The memory of the point that it was
     pub(super) partner: Option<&'a PointMemory>,
-    pub(super) law: ContactLaw,
-    pub(super) state: PointState,
+    pub(super) law: &'a ContactLaw,
+    pub(super) state: &'a PointState,
 }
 
 /// A node as its surface sees it in a state, for the memory.
@@ -59,7 +58,7 @@ impl<'a> ChainNow<'a> {
                 _ => self.add::<4>(candidate, &law, weights, &mut system),
             };
             let Some(state) = state else { continue };
-            visit(&PointNow { candidate, predecessors, partner, law, state }, &system);
+            visit(&PointNow { candidate, predecessors, partner, law: &law, state: &state }, &system);
         }
     }
 
@@ -74,10 +73,12 @@ impl<'a> ChainNow<'a> {
         let shape = shape::<N>(candidate);
         let nodes = self.chain.nodes_of(candidate.element);
         let first = candidate.element * self.chain.order;
-        let nodes: [ContactNode; N] = std::array::from_fn(|i| self.node(&nodes[i], first + i, law.friction.is_some()));
+        let turning = |i: usize| self.turning(&nodes[i], first + i);
+        let turning: Option<[NodeTurning; N]> = law.friction.map(|_| std::array::from_fn(turning));
+        let nodes: [ContactNode; N] = std::array::from_fn(|i| self.node(&nodes[i]));
         let place = (0..N).fold(Vec3::ZERO, |sum, i| sum + nodes[i].place * shape.values[i]);
         let distance = candidate.distance(&self.surface.surface, self.carrier.on_surface(place))?;
-        Some(add_point(&nodes, &shape, &self.carrier, &distance, law, weights, out))
+        Some(add_point(&nodes, turning.as_ref(), &shape, &self.carrier, &distance, law, weights, out))
     }
 
     /// The points with a force, for memory. Points that an augmentation finds open keep the traction of
@@ -99,16 +100,15 @@ impl<'a> ChainNow<'a> {
         points
     }
 
-    fn node(&self, node: &ChainNode, number: usize, rubs: bool) -> ContactNode {
-        let place = node.place + self.at.q[node.node.u as usize];
-        let velocity = self.at.v[node.node.u as usize];
-        if !rubs {
-            let before = NodeBefore { place: Vec3::ZERO, rotation: Mat3::IDENTITY };
-            return ContactNode { place, velocity, rotation: Rotation::new(Vec3::ZERO), before };
-        }
+    fn node(&self, node: &ChainNode) -> ContactNode {
+        let slot = node.node.u as usize;
+        ContactNode { place: node.place + self.at.q[slot], velocity: self.at.v[slot] }
+    }
+
+    fn turning(&self, node: &ChainNode, number: usize) -> NodeTurning {
         let known = self.memory.and_then(|memory| memory.nodes.get(number));
         let before = known.copied().unwrap_or_else(|| self.initial(node));
-        ContactNode { place, velocity, rotation: self.at.rotation(node.node.p), before }
+        NodeTurning { rotation: self.at.rotation(node.node.p), before }
     }
 
     /// A node as the surface saw it at the start of the run.

@@ -484,6 +484,7 @@ impl Contacts for SurfaceContacts {
 
     fn begin_penalty(&self, at: &mut State) {
         at.contacts.deepest = 0.0;
+        at.contacts.deepest_between = 0.0;
         at.contacts.shortest = None;
         let before = Contacts::energy(self, at);
         at.contacts.regime = ContactRegime::Penalty;

@@ -8,6 +8,7 @@
 
 use crate::kernel::contact::CarriedTraction;
 use crate::system::PointMemory;
+use std::cmp::Ordering;
 
 /// The largest distance, in elements, between the places of a contact in two states.
 pub(super) const LARGEST_SHIFT: f64 = 1.5;
@@ -37,6 +38,37 @@ pub(super) struct Link {
     pub(super) shift: f64,
 }
 
+impl Link {
+    fn numbers(&self) -> (usize, usize) {
+        (self.candidate, self.point)
+    }
+}
+
+/// The order in which links are taken.
+fn order(a: &Link, b: &Link) -> Ordering {
+    a.relation.cmp(&b.relation).then(a.shift.total_cmp(&b.shift)).then(a.numbers().cmp(&b.numbers()))
+}
+
+/// Takes the links that are the first ones both of their candidate and of their point, as nearly all are: no
+/// other link can come before them.
+fn take_mutual(links: &[Link], found: &mut [Predecessors], is_taken: &mut [bool]) {
+    let mut of_candidates: Vec<Option<&Link>> = vec![None; found.len()];
+    let mut of_points: Vec<Option<&Link>> = vec![None; is_taken.len()];
+    for link in links.iter().filter(|link| link.relation != Relation::Beside) {
+        for first in [&mut of_candidates[link.candidate], &mut of_points[link.point]] {
+            if first.is_none_or(|first| order(link, first).is_lt()) {
+                *first = Some(link);
+            }
+        }
+    }
+    for link in of_candidates.into_iter().flatten() {
+        if of_points[link.point].is_some_and(|first| first.numbers() == link.numbers()) {
+            found[link.candidate].own = Some(link.point);
+            is_taken[link.point] = true;
+        }
+    }
+}
+
 /// The points in memory from which a candidate takes over.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Predecessors {
@@ -52,10 +84,9 @@ impl Predecessors {
     pub fn of(mut links: Vec<Link>, candidates: usize, points: usize) -> Vec<Self> {
         let mut found = vec![Self::default(); candidates];
         let mut is_taken = vec![false; points];
-        let numbers = |link: &Link| (link.candidate, link.point);
-        links.sort_by(|a, b| {
-            a.relation.cmp(&b.relation).then(a.shift.total_cmp(&b.shift)).then(numbers(a).cmp(&numbers(b)))
-        });
+        take_mutual(&links, &mut found, &mut is_taken);
+        links.retain(|link| !is_taken[link.point]);
+        links.sort_by(order);
         for link in links.iter().filter(|link| link.relation != Relation::Beside) {
             let own = &mut found[link.candidate].own;
             if own.is_none() && !is_taken[link.point] {
@@ -64,7 +95,7 @@ impl Predecessors {
             }
         }
         links.retain(|link| !is_taken[link.point]);
-        links.sort_by(|a, b| a.shift.total_cmp(&b.shift).then(numbers(a).cmp(&numbers(b))));
+        links.sort_by(|a, b| a.shift.total_cmp(&b.shift).then(a.numbers().cmp(&b.numbers())));
         for link in links {
             if !is_taken[link.point] {
                 found[link.candidate].merged.push(link.point);

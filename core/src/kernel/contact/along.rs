@@ -162,16 +162,26 @@ pub fn slopes<const N: usize>(nodes: &[Vec3; N], shape: &ShapeAt<N>, distance: &
     Bend::at(nodes, shape, distance).slopes
 }
 
+/// Parts of an element with `nodes` nodes, each of which has one local minimum of a convex distance at most: a straight
+/// element as a whole.
+pub const fn intervals_of_convex(nodes: usize) -> usize {
+    if nodes == 2 { 1 } else { 2 * nodes.saturating_sub(1) }
+}
+
 /// The local minima between the ends of an element whose nodes are at `nodes` in the axes of the
-/// surface's carrier. `distance` is that of the surface; `None` where it is undefined.
-pub fn minima<const N: usize>(nodes: &[Vec3; N], distance: &dyn Fn(Vec3) -> Option<Distance>) -> Minima {
+/// surface's carrier, one in each of `intervals` equal parts at most. `distance` is that of the surface; `None`
+/// where it is undefined.
+pub fn minima<const N: usize>(
+    nodes: &[Vec3; N],
+    intervals: usize,
+    distance: &dyn Fn(Vec3) -> Option<Distance>,
+) -> Minima {
     let mut out = Minima::default();
     let at = |s: f64| {
         let shape = ShapeAt::<N>::new(s);
         let here = distance(weighted_sum(&shape.values, |i| nodes[i]))?;
         Some(Bend::at(nodes, &shape, &here))
     };
-    let intervals = 2 * N.saturating_sub(1);
     interior_minima(intervals, &|s| at(s).map(|bend| bend.slopes), &mut |s| {
         let kind = at(s).map_or(Some(MinimumKind::Kink), |bend| bend.kind());
         if let Some(kind) = kind {
@@ -183,11 +193,13 @@ pub fn minima<const N: usize>(nodes: &[Vec3; N], distance: &dyn Fn(Vec3) -> Opti
 
 #[cfg(test)]
 mod tests {
+    use super::super::cone::Cone;
     use super::super::distance::Side;
     use super::super::dual::{Dual, Random};
     use super::super::surface::{Shape, Surface};
     use super::*;
     use std::array::from_fn;
+    use std::ops::Range;
 
     fn shapes_hold<const N: usize>() {
         for s in [0.0, 0.13, 0.5, 0.77, 1.0] {
@@ -214,7 +226,8 @@ mod tests {
         assert_eq!((one.values, one.slopes, one.bends), ([1.0], [0.0], [0.0]));
     }
 
-    /// Minima of the distance among many points along the element.
+    /// Minima of the distance among many points along the element: those that are deeper than their surroundings by five
+    /// ten-thousandths of the element.
     fn scanned<const N: usize>(nodes: &[Vec3; N], surface: &Surface) -> Option<Vec<f64>> {
         const COUNT: usize = 1000;
         let value = |k: usize| {
@@ -223,17 +236,21 @@ mod tests {
         };
         let values: Option<Vec<f64>> = (0..=COUNT).map(value).collect();
         let values = values?;
-        let is_least = |&k: &usize| values[k] < values[k - 1] && values[k] <= values[k + 1];
+        let near = COUNT / 12;
+        let prominent = 5e-4 * (nodes[N - 1] - nodes[0]).norm();
+        let is_least = |&k: &usize| {
+            let sides = [k.saturating_sub(near)..k, k + 1..(k + near + 1).min(COUNT + 1)];
+            let highest = |side: Range<usize>| values[side].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let is_deep = || sides.into_iter().all(|side| highest(side) - values[k] > prominent);
+            values[k] < values[k - 1] && values[k] <= values[k + 1] && is_deep()
+        };
         Some((1..COUNT).filter(is_least).map(|k| k as f64 / COUNT as f64).collect())
     }
 
-    /// Elements near a torus, with a bend of up to `bend` of their length: the number of minima
+    /// Elements near a surface, with a bend of up to `bend` of their length: the number of minima
     /// found, and of those that only the scan finds.
-    fn compare<const N: usize>(bend: f64, side: Side) -> (usize, usize) {
+    fn compare<const N: usize>(bend: f64, surface: &Surface) -> (usize, usize) {
         let mut random = Random(21);
-        let axis = random.direction();
-        let shape = Shape::Torus { centre: random.vector(0.2), axis, ring: 1.1, radius: 0.4 };
-        let surface = Surface { shape, side };
         let distance = |y: Vec3| surface.distance(y).ok();
         let mut found_in_all = 0;
         let mut missed = 0;
@@ -242,8 +259,8 @@ mod tests {
             let along = random.direction() * random.between(0.2, 1.0);
             let nodes: [Vec3; N] =
                 from_fn(|i| from + along * (i as f64 / (N - 1) as f64) + random.vector(bend * along.norm()));
-            let found = minima(&nodes, &distance);
-            let Some(scanned) = scanned(&nodes, &surface) else { continue };
+            let found = minima(&nodes, surface.intervals(&nodes), &distance);
+            let Some(scanned) = scanned(&nodes, surface) else { continue };
             found_in_all += found.found().len();
             for s in &scanned {
                 if !found.found().iter().any(|minimum| (minimum.s - s).abs() < 2e-3) {
@@ -256,9 +273,12 @@ mod tests {
                 let here = surface.distance(weighted_sum(&shape.values, |i| nodes[i])).unwrap();
                 let slopes = slopes(&nodes, &shape, &here);
                 assert!(slopes.second > 0.0 && s > 0.0 && s < 1.0);
-                assert!(slopes.first.abs() < 1e-13, "{slopes:?}");
-                let near = scanned.iter().any(|other| (other - s).abs() < 2e-3);
-                assert!(near || !(1e-3..=1.0 - 1e-3).contains(&s), "{s} {scanned:?}");
+                assert!(slopes.first.abs() < 1e-13 + 1e-15 * slopes.second, "{slopes:?}");
+                let values = [-1e-3, 0.0, 1e-3].map(|shift| {
+                    let shape = ShapeAt::<N>::new(s + shift);
+                    surface.distance(weighted_sum(&shape.values, |i| nodes[i])).unwrap().value
+                });
+                assert!(values[1] < values[0].min(values[2]), "{s} {values:?}");
             }
         }
         (found_in_all, missed)
@@ -266,11 +286,22 @@ mod tests {
 
     #[test]
     fn minima_along_elements_are_found() {
-        for side in [Side::Outside, Side::Inside] {
-            let counts = [compare::<2>(0.0, side), compare::<3>(0.05, side), compare::<4>(0.03, side)];
-            println!("minima found and missed, {side:?}: {counts:?}");
-            for (found, missed) in counts {
-                assert!(found >= 25 && missed == 0, "{counts:?}");
+        let mut random = Random(22);
+        for _ in 0..5 {
+            let axis = random.direction();
+            let mut centre = || random.vector(0.3);
+            let torus = Shape::Torus { centre: centre(), axis, ring: 1.1, radius: 0.4 };
+            let cylinder = Shape::Cylinder { point: centre(), axis, radius: 0.4 };
+            let cone = Shape::Cone(Cone::new(centre(), centre(), [0.5, 0.2]).unwrap());
+            let ball = Shape::Sphere { centre: centre(), radius: 0.6 };
+            let inside = [torus.clone(), cylinder.clone()].map(|shape| Surface { shape, side: Side::Inside });
+            let outside = [torus, cylinder, cone, ball].map(|shape| Surface { shape, side: Side::Outside });
+            for surface in inside.into_iter().chain(outside) {
+                let counts = [compare::<2>(0.0, &surface), compare::<3>(0.05, &surface), compare::<4>(0.03, &surface)];
+                println!("minima found and missed, {surface:?}: {counts:?}");
+                let is_concave = surface.side == Side::Inside && matches!(surface.shape, Shape::Cylinder { .. });
+                assert!(is_concave || counts.iter().all(|&(found, _)| found >= 15), "{surface:?} {counts:?}");
+                assert!(counts.iter().all(|&(_, missed)| missed == 0), "{surface:?} {counts:?}");
             }
         }
     }
@@ -281,10 +312,10 @@ mod tests {
         let plane = Surface { shape, side: Side::Outside };
         let distance = |y: Vec3| plane.distance(y).ok();
         let line = |height: f64| [Vec3::ZERO, Vec3([1.0, 0.0, height])];
-        assert!(minima(&line(0.0), &distance).found().is_empty());
-        assert!(minima(&line(0.1), &distance).found().is_empty());
+        assert!(minima(&line(0.0), 1, &distance).found().is_empty());
+        assert!(minima(&line(0.1), 1, &distance).found().is_empty());
         let bent = [Vec3([0.0, 0.0, 1.0]), Vec3([0.5, 0.0, 0.0]), Vec3([1.0, 0.0, 1.0])];
-        assert_eq!(minima(&bent, &distance).found(), [Minimum { s: 0.5, kind: MinimumKind::Conforming }]);
+        assert_eq!(minima(&bent, 4, &distance).found(), [Minimum { s: 0.5, kind: MinimumKind::Conforming }]);
     }
 
     #[test]
@@ -295,9 +326,9 @@ mod tests {
         let distance = |y: Vec3| cuboid.distance(y).ok();
         // A line across an edge, outside of the box and through its body.
         let line = |shift: f64| [Vec3([0.6 + shift, 1.2 + shift, 0.0]), Vec3([1.3 + shift, 0.5 + shift, 0.0])];
-        let outside = minima(&line(0.2), &distance);
+        let outside = minima(&line(0.2), 1, &distance);
         assert!(matches!(outside.found(), [Minimum { kind: MinimumKind::Sharp, .. }]), "{outside:?}");
-        let inside = minima(&line(0.0), &distance);
+        let inside = minima(&line(0.0), 1, &distance);
         assert!(matches!(inside.found(), [Minimum { kind: MinimumKind::Kink, .. }]), "{inside:?}");
     }
 
@@ -309,7 +340,7 @@ mod tests {
         };
         let kinds = |nodes: &[Vec3; 3], radius: f64| -> Vec<MinimumKind> {
             let surface = cylinder(radius);
-            minima(nodes, &|y| surface.distance(y).ok()).found().iter().map(|minimum| minimum.kind).collect()
+            minima(nodes, 4, &|y| surface.distance(y).ok()).found().iter().map(|minimum| minimum.kind).collect()
         };
         let straight = [Vec3([-0.1, 1.0, 0.0]), Vec3([0.0, 1.0, 0.0]), Vec3([0.1, 1.0, 0.0])];
         // Nearly an arc of radius one, and a bend towards the cylinder.

@@ -38,7 +38,7 @@ use super::along::{ShapeAt, weighted_sum};
 use super::friction::{CarriedTraction, FrictionLaw, Status, Traction};
 use super::law::NormalLaw;
 use super::point::PointState;
-use super::variation::{Change, Column, ContactNode, Derived, Turned};
+use super::variation::{Change, Column, ContactNode, Derived, NodeTurning, Turned};
 use crate::kernel::element::{ElementSystem, MAX_NODES, Weights};
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
@@ -46,8 +46,10 @@ use crate::tensor::{Mat3, Vec3};
 /// One of the two elements of a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct PairSide<const N: usize, T = f64> {
-    /// The nodes; their states before are seen from the carrier of the pair
+    /// The nodes
     pub(crate) nodes: [ContactNode<T>; N],
+    /// How they are turned, which only friction needs; states before are seen from the carrier of the pair
+    pub(crate) turning: Option<[NodeTurning<T>; N]>,
     /// The shape functions at the point
     pub(crate) shape: ShapeAt<N, T>,
 }
@@ -103,7 +105,9 @@ pub fn add_pair<const NA: usize, const NB: usize, T: Real>(
     weights: Weights,
     out: &mut ElementSystem<T>,
 ) -> Option<PointState<T>> {
-    let q = b.nodes[law.carrier].rotation.r;
+    let both = law.friction.as_ref().and_then(|friction| Some((friction, a.turning.as_ref()?, b.turning.as_ref()?)));
+    // Without friction it does not matter how the axes are turned.
+    let q = both.map_or(Mat3::identity(), |(_, _, turning_b)| turning_b[law.carrier].rotation.r);
     let place = q.transpose_mul(a.place() - b.place());
     let length = place.norm();
     if length.largest() <= 0.0 || length.largest().is_nan() {
@@ -122,12 +126,12 @@ pub fn add_pair<const NA: usize, const NB: usize, T: Real>(
         return Some(state);
     }
     let arms = law.radii.map(|radius| T::constant(radius) + gap * 0.5);
-    let turned = law.friction.map(|_| (Turned::new(&a.nodes, &a.shape, &q), Turned::new(&b.nodes, &b.shape, &q)));
+    let turned = both
+        .map(|(_, turning_a, turning_b)| (Turned::new(turning_a, &a.shape, &q), Turned::new(turning_b, &b.shape, &q)));
     let mut rolling = Vec3::zero();
     let mut angles = Vec3::zero();
-    if let (Some(friction), Some((turned_a, turned_b))) = (&law.friction, &turned) {
-        let before = weighted_sum(&a.shape.values, |i| Vec3::constant(a.nodes[i].before.place))
-            - weighted_sum(&b.shape.values, |k| Vec3::constant(b.nodes[k].before.place));
+    if let (Some((friction, ..)), Some((turned_a, turned_b))) = (both, &turned) {
+        let before = turned_a.before(&a.shape.values) - turned_b.before(&b.shape.values);
         angles = turned_a.angle + turned_b.angle;
         rolling = turned_a.angle * arms[0] + turned_b.angle * arms[1];
         let sliding = place - before - rolling.cross(normal);
@@ -155,7 +159,7 @@ struct Pair<'a, const NA: usize, const NB: usize, T> {
     rate: Vec3<T>,
     /// a_A and a_B
     arms: [T; 2],
-    turned: Option<(Turned<NA, T>, Turned<NB, T>)>,
+    turned: Option<(Turned<'a, NA, T>, Turned<'a, NB, T>)>,
     /// theta_A + theta_B
     angles: Vec3<T>,
     /// Theta
@@ -254,11 +258,11 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         let Some((turned_a, turned_b)) = &self.turned else { return };
         for i in 0..NA {
             let material = turned_a.rotations[i].transpose_mul(loads.moments[0]);
-            forces[2 * i + 1] += self.a.nodes[i].rotation.t.transpose_mul(material) * on_a[i];
+            forces[2 * i + 1] += turned_a.nodes[i].rotation.t.transpose_mul(material) * on_a[i];
         }
         for k in 0..NB {
             let material = turned_b.rotations[k].transpose_mul(loads.moments[1]);
-            forces[2 * (NA + k) + 1] += self.b.nodes[k].rotation.t.transpose_mul(material) * on_b[k];
+            forces[2 * (NA + k) + 1] += turned_b.nodes[k].rotation.t.transpose_mul(material) * on_b[k];
         }
     }
 
@@ -269,34 +273,37 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
 
     /// Adds the derivatives of F and of the moments, without those of Q, T and S.
     fn add_columns(&self, loads: &Loads<T>, weights: Weights, out: &mut ElementSystem<T>) {
+        let mut displacements = [(0, T::zero()); 2 * MAX_NODES];
         for i in 0..NA {
-            self.add_column(2 * i, &self.displacement(self.a.shape.values[i], weights), loads, out);
+            displacements[i] = (2 * i, self.a.shape.values[i]);
         }
         for k in 0..NB {
-            self.add_column(2 * (NA + k), &self.displacement(-self.b.shape.values[k], weights), loads, out);
+            displacements[NA + k] = (2 * (NA + k), -self.b.shape.values[k]);
         }
-        let Some((turned_a, turned_b)) = &self.turned else { return };
+        self.add_column(&displacements[..NA + NB], &self.displacement(weights), loads, out);
+        let Some(turned) = &self.turned else { return };
+        let (turned_a, turned_b) = turned;
         let column = |rolling: Mat3<T>| Column {
             place: Mat3::zero(),
             rolling: rolling.scale(weights.stiffness),
             pressure: Vec3::zero(),
         };
         for i in 0..NA {
-            let spun = turned_a.maps[i] * (turned_a.rotations[i] * self.a.nodes[i].rotation.t);
+            let spun = turned_a.maps[i] * (turned_a.rotations[i] * turned_a.nodes[i].rotation.t);
             let rolling = spun * (self.a.shape.values[i] * self.arms[0]);
-            self.add_column(2 * i + 1, &column(rolling), loads, out);
+            self.add_column(&[(2 * i + 1, T::one())], &column(rolling), loads, out);
         }
         for k in 0..NB {
-            let spun = turned_b.maps[k] * (turned_b.rotations[k] * self.b.nodes[k].rotation.t);
+            let spun = turned_b.maps[k] * (turned_b.rotations[k] * turned_b.nodes[k].rotation.t);
             let rolling = spun * (self.b.shape.values[k] * self.arms[1]);
-            self.add_column(2 * (NA + k) + 1, &column(rolling), loads, out);
+            self.add_column(&[(2 * (NA + k) + 1, T::one())], &column(rolling), loads, out);
         }
-        self.add_column(self.carrier(), &self.carrier_rotation(weights), loads, out);
+        self.add_column(&[(self.carrier(), T::one())], &self.carrier_rotation(turned, weights), loads, out);
     }
 
-    /// The column of a displacement that moves D by `factor` times itself.
-    fn displacement(&self, factor: T, weights: Weights) -> Column<T> {
-        let moved = self.q.transpose() * factor;
+    /// The column of a change of D.
+    fn displacement(&self, weights: Weights) -> Column<T> {
+        let moved = self.q.transpose();
         let by_rate = self.normal * self.state.normal_force.over_rate;
         let pressure = self.pressure_over_place().scale(weights.stiffness) + by_rate.scale(weights.damping);
         Column { place: moved.scale(weights.stiffness), rolling: Mat3::zero(), pressure: moved.transpose() * pressure }
@@ -304,47 +311,46 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
 
     /// The column of the rotation of the carrier, at constant spatial D and rotations of the nodes:
     /// it changes neither the gap nor its rate.
-    fn carrier_rotation(&self, weights: Weights) -> Column<T> {
-        let t = self.b.nodes[self.law.carrier].rotation.t.scale(weights.stiffness);
+    fn carrier_rotation(&self, (turned_a, turned_b): &(Turned<NA, T>, Turned<NB, T>), weights: Weights) -> Column<T> {
+        let t = turned_b.nodes[self.law.carrier].rotation.t.scale(weights.stiffness);
         let mut rolling = Mat3::zero();
-        if let Some((turned_a, turned_b)) = &self.turned {
-            for i in 0..NA {
-                rolling -= turned_a.maps[i] * t * (self.a.shape.values[i] * self.arms[0]);
-            }
-            for k in 0..NB {
-                rolling -= turned_b.maps[k] * t * (self.b.shape.values[k] * self.arms[1]);
-            }
+        for i in 0..NA {
+            rolling -= turned_a.maps[i] * t * (self.a.shape.values[i] * self.arms[0]);
+        }
+        for k in 0..NB {
+            rolling -= turned_b.maps[k] * t * (self.b.shape.values[k] * self.arms[1]);
         }
         Column { place: Mat3::skew_mul(self.place, t), rolling, pressure: Vec3::zero() }
     }
 
-    fn add_column(&self, block: usize, column: &Column<T>, loads: &Loads<T>, out: &mut ElementSystem<T>) {
+    /// Adds a column to blocks, each times its factor.
+    fn add_column(&self, blocks: &[(usize, T)], column: &Column<T>, loads: &Loads<T>, out: &mut ElementSystem<T>) {
         let spatial = self.q * loads.force.over(column);
+        let mut add =
+            |row: usize, of_row: Mat3<T>| blocks.iter().for_each(|&(block, f)| out.add_tangent(row, block, of_row * f));
         for i in 0..NA {
-            out.add_tangent(2 * i, block, -spatial * self.a.shape.values[i]);
+            add(2 * i, -spatial * self.a.shape.values[i]);
         }
         for k in 0..NB {
-            out.add_tangent(2 * (NA + k), block, spatial * self.b.shape.values[k]);
+            add(2 * (NA + k), spatial * self.b.shape.values[k]);
         }
         let Some((turned_a, turned_b)) = &self.turned else { return };
         let moments = [loads.moments[0].over(column), loads.moments[1].over(column)];
         for i in 0..NA {
             let material = turned_a.rotations[i].transpose_matmul(moments[0]);
-            let row = self.a.nodes[i].rotation.t.transpose_matmul(material) * self.a.shape.values[i];
-            out.add_tangent(2 * i + 1, block, row);
+            add(2 * i + 1, turned_a.nodes[i].rotation.t.transpose_matmul(material) * self.a.shape.values[i]);
         }
         for k in 0..NB {
             let material = turned_b.rotations[k].transpose_matmul(moments[1]);
-            let row = self.b.nodes[k].rotation.t.transpose_matmul(material) * self.b.shape.values[k];
-            out.add_tangent(2 * (NA + k) + 1, block, row);
+            add(2 * (NA + k) + 1, turned_b.nodes[k].rotation.t.transpose_matmul(material) * self.b.shape.values[k]);
         }
     }
 
     /// Adds the derivatives of Q, T and S at constant loads.
     fn add_geometric(&self, loads: &Loads<T>, weight: f64, out: &mut ElementSystem<T>) {
         let Some((turned_a, turned_b)) = &self.turned else { return };
-        let carried = self.b.nodes[self.law.carrier].rotation.t.scale(weight);
-        let turned = self.q * Mat3::skew_mul(loads.force.value, carried);
+        let carried = turned_b.nodes[self.law.carrier].rotation.t;
+        let turned = self.q * Mat3::skew_mul(loads.force.value, carried.scale(weight));
         for i in 0..NA {
             out.add_tangent(2 * i, self.carrier(), turned * self.a.shape.values[i]);
         }
@@ -352,31 +358,29 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
             out.add_tangent(2 * (NA + k), self.carrier(), -(turned * self.b.shape.values[k]));
         }
         for i in 0..NA {
-            let side = (&self.a.nodes[i], &turned_a.rotations[i], self.a.shape.values[i]);
-            self.add_spin(2 * i + 1, side, loads.moments[0].value, weight, out);
+            let side = (&turned_a.nodes[i], &turned_a.rotations[i], self.a.shape.values[i] * weight);
+            self.add_spin(2 * i + 1, side, loads.moments[0].value, &carried, out);
         }
         for k in 0..NB {
-            let side = (&self.b.nodes[k], &turned_b.rotations[k], self.b.shape.values[k]);
-            self.add_spin(2 * (NA + k) + 1, side, loads.moments[1].value, weight, out);
+            let side = (&turned_b.nodes[k], &turned_b.rotations[k], self.b.shape.values[k] * weight);
+            self.add_spin(2 * (NA + k) + 1, side, loads.moments[1].value, &carried, out);
         }
     }
 
-    /// Adds the derivatives of T and S of one node at a constant moment.
+    /// Adds the derivatives of T and S of one node at a constant moment. `carried`: T of the carrier.
     fn add_spin(
         &self,
         block: usize,
-        (node, s, factor): (&ContactNode<T>, &Mat3<T>, T),
+        (node, s, factor): (&NodeTurning<T>, &Mat3<T>, T),
         moment: Vec3<T>,
-        weight: f64,
+        carried: &Mat3<T>,
         out: &mut ElementSystem<T>,
     ) {
-        let carried = self.b.nodes[self.law.carrier].rotation.t;
-        let factor = factor * weight;
         let t = node.rotation.t;
         let back = t.transpose() * s.transpose() * factor;
         let own = back * Mat3::skew_mul(moment, *s * t) + node.rotation.c2(s.transpose_mul(moment)) * factor;
         out.add_tangent(block, block, own);
-        out.add_tangent(block, self.carrier(), -(back * Mat3::skew_mul(moment, carried)));
+        out.add_tangent(block, self.carrier(), -(back * Mat3::skew_mul(moment, *carried)));
     }
 
     /// Adds -f_s F_ss^-1 F_sq for the free parameters, unless F_ss is not positive definite.
@@ -457,7 +461,7 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         let change = Change {
             place: z,
             rolling: weighted_sum(&shape.slopes, angles) * self.arms[0],
-            before: weighted_sum(&shape.slopes, |i| Vec3::constant(self.a.nodes[i].before.place)),
+            before: self.turned.as_ref().map_or(Vec3::zero(), |(a, _)| a.before(&shape.slopes)),
             pressure: self.pressure_over_place().dot(z) + self.normal.dot(faster) * self.state.normal_force.over_rate,
         };
         self.along(loads, &change, (&shape.slopes, &[T::zero(); NB]))
@@ -472,7 +476,7 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         let change = Change {
             place: -z,
             rolling: weighted_sum(&shape.slopes, angles) * self.arms[1],
-            before: -weighted_sum(&shape.slopes, |k| Vec3::constant(self.b.nodes[k].before.place)),
+            before: self.turned.as_ref().map_or(Vec3::zero(), |(_, b)| -b.before(&shape.slopes)),
             pressure: -(self.pressure_over_place().dot(z)
                 + self.normal.dot(faster) * self.state.normal_force.over_rate),
         };

@@ -10,8 +10,11 @@ pub struct Slopes {
     pub(super) second: f64,
 }
 
-/// Parts of the width of a bracket below which a minimum is found.
+/// Brackets below this width have no room for another point.
 const RESOLUTION: f64 = 1e-16;
+
+/// The largest step of Newton's method that is the last one: the error behind it is about the square.
+const LAST_STEP: f64 = 1e-9;
 
 /// Halvings that take any bracket to round-off.
 const MAX_ITERATIONS: usize = 80;
@@ -27,20 +30,22 @@ pub fn interior_minima(intervals: usize, slopes: &dyn Fn(f64) -> Option<Slopes>,
         if let (Some(before), Some(after)) = (low.1, high.1) {
             let rises = after.first > 0.0 || (after.first == 0.0 && k < intervals);
             if before.first < 0.0 && rises {
-                show(minimum_between(low.0, high.0, slopes));
+                // Where a straight line between the slopes is zero: of a chord on a round surface, nearly.
+                let part = before.first / (before.first - after.first);
+                show(minimum_between(low.0, high.0, low.0 + (high.0 - low.0) * part, slopes));
             }
         }
         low = high;
     }
 }
 
-/// The zero of the slope between `low`, where it is negative, and `high`, where it is not: Newton's
+/// The zero of the slope between `low`, where it is negative, and `high`, where it is not, from a `guess`: Newton's
 /// method within a bracket, halved where a step would leave it. A point without a slope on the way,
 /// as on the axis of a surface, is the minimum: the function has a kink there.
-fn minimum_between(low: f64, high: f64, slopes: &dyn Fn(f64) -> Option<Slopes>) -> f64 {
+fn minimum_between(low: f64, high: f64, guess: f64, slopes: &dyn Fn(f64) -> Option<Slopes>) -> f64 {
     let mut low = low;
     let mut high = high;
-    let mut s = 0.5 * (low + high);
+    let mut s = guess;
     for _ in 0..MAX_ITERATIONS {
         let Some(here) = slopes(s) else { return s };
         if here.first == 0.0 {
@@ -52,8 +57,9 @@ fn minimum_between(low: f64, high: f64, slopes: &dyn Fn(f64) -> Option<Slopes>) 
             high = s;
         }
         let newton = s - here.first / here.second;
-        let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
-        if (next - s).abs() <= RESOLUTION || high - low <= RESOLUTION {
+        let is_inside = newton >= low && newton <= high;
+        let next = if is_inside { newton } else { 0.5 * (low + high) };
+        if (is_inside && (next - s).abs() <= LAST_STEP) || high - low <= RESOLUTION {
             return next;
         }
         s = next;

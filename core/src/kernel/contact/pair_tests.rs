@@ -7,7 +7,7 @@ use super::friction::{CarriedTraction, FrictionLaw, Status};
 use super::law::NormalLaw;
 use super::pair_search::bilateral;
 use super::point::PointState;
-use super::variation::{ContactNode, NodeBefore};
+use super::variation::{ContactNode, NodeBefore, NodeTurning};
 use crate::kernel::element::{ElementSystem, MAX_NODES, Weights};
 use crate::rotation::Rotation;
 use crate::scalar::Real;
@@ -58,19 +58,25 @@ impl Body {
     }
 
     fn now(&self) -> ContactNode {
-        let Self { place, velocity, before, .. } = *self;
-        ContactNode { place, velocity, rotation: self.rotation(), before }
+        let Self { place, velocity, .. } = *self;
+        ContactNode { place, velocity }
+    }
+
+    fn turning(&self) -> NodeTurning {
+        NodeTurning { rotation: self.rotation(), before: self.before }
     }
 
     /// The node, whose derivatives are those of the weights along directions.
     fn dual(&self, first: usize, directions: &[Vec<f64>; DIRECTIONS], weights: Weights) -> ContactNode<D> {
-        let p = along(self.p, first + 3, directions, weights.stiffness);
         ContactNode {
             place: along(self.place, first, directions, weights.stiffness),
             velocity: along(self.velocity, first, directions, weights.damping),
-            rotation: Rotation::new(p).after(Mat3::constant(self.base)),
-            before: self.before,
         }
+    }
+
+    fn dual_turning(&self, first: usize, directions: &[Vec<f64>; DIRECTIONS], weights: Weights) -> NodeTurning<D> {
+        let p = along(self.p, first + 3, directions, weights.stiffness);
+        NodeTurning { rotation: Rotation::new(p).after(Mat3::constant(self.base)), before: self.before }
     }
 
     fn moved(&self, by: &Mat3, shift: Vec3) -> Self {
@@ -80,8 +86,11 @@ impl Body {
 
 impl<const NA: usize, const NB: usize> Scene<NA, NB> {
     fn now(&self, weights: Weights) -> (ElementSystem, PointState) {
-        let a = PairSide { nodes: from_fn(|i| self.a[i].now()), shape: ShapeAt::<NA>::new(self.s) };
-        let b = PairSide { nodes: from_fn(|k| self.b[k].now()), shape: ShapeAt::<NB>::new(self.e) };
+        let turning_a = Some(from_fn(|i| self.a[i].turning()));
+        let turning_b = Some(from_fn(|k| self.b[k].turning()));
+        let [s, e] = [self.s, self.e];
+        let a = PairSide { nodes: from_fn(|i| self.a[i].now()), turning: turning_a, shape: ShapeAt::<NA>::new(s) };
+        let b = PairSide { nodes: from_fn(|k| self.b[k].now()), turning: turning_b, shape: ShapeAt::<NB>::new(e) };
         let mut out = ElementSystem::new(2 * (NA + NB));
         let state = add_pair(&a, &b, &self.law, weights, &mut out).unwrap();
         (out, state)
@@ -92,8 +101,10 @@ impl<const NA: usize, const NB: usize> Scene<NA, NB> {
         let nodes_a: [ContactNode<D>; NA] = from_fn(|i| self.a[i].dual(6 * i, directions, weights));
         let nodes_b: [ContactNode<D>; NB] = from_fn(|k| self.b[k].dual(6 * (NA + k), directions, weights));
         let (s, e) = self.closest(&nodes_a, &nodes_b);
-        let a = PairSide { nodes: nodes_a, shape: ShapeAt::new(s) };
-        let b = PairSide { nodes: nodes_b, shape: ShapeAt::new(e) };
+        let turning_a = Some(from_fn(|i| self.a[i].dual_turning(6 * i, directions, weights)));
+        let turning_b = Some(from_fn(|k| self.b[k].dual_turning(6 * (NA + k), directions, weights)));
+        let a = PairSide { nodes: nodes_a, turning: turning_a, shape: ShapeAt::new(s) };
+        let b = PairSide { nodes: nodes_b, turning: turning_b, shape: ShapeAt::new(e) };
         let mut out = ElementSystem::new(2 * (NA + NB));
         add_pair(&a, &b, &self.law, Weights::NONE, &mut out).unwrap();
         out

@@ -56,8 +56,8 @@ use super::along::{ShapeAt, weighted_sum};
 use super::distance::Distance;
 use super::friction::{CarriedTraction, FrictionLaw, Status, Traction};
 use super::law::{NormalForce, NormalLaw};
-use super::variation::{Change, Column, ContactNode, Derived, Turned};
-use crate::kernel::element::{ElementSystem, Weights};
+use super::variation::{Change, Column, ContactNode, Derived, NodeTurning, Turned};
+use crate::kernel::element::{ElementSystem, MAX_NODES, Weights};
 use crate::rotation::Rotation;
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
@@ -173,9 +173,10 @@ struct Seen<T> {
 
 /// Adds the forces of a contact point to `out`, and the tangent of the weights: blocks x_1, P_1, …,
 /// x_N, P_N and, for a carrier with unknowns, c, P_s. `distance` is that of the surface at
-/// [`Carrier::on_surface`] of the point.
+/// [`Carrier::on_surface`] of the point. Only friction needs how nodes are turned.
 pub fn add_point<const N: usize, T: Real>(
     nodes: &[ContactNode<T>; N],
+    turning: Option<&[NodeTurning<T>; N]>,
     shape: &ShapeAt<N, T>,
     carrier: &Carrier<T>,
     distance: &Distance<T>,
@@ -190,15 +191,17 @@ pub fn add_point<const N: usize, T: Real>(
     if state.status() == Status::Open {
         return state;
     }
-    let turned = law.friction.map(|_| Turned::new(nodes, shape, &carrier.rotation.r));
-    let before = weighted_sum(&shape.values, |i| Vec3::constant(nodes[i].before.place));
-    if let (Some(friction), Some(turned)) = (&law.friction, &turned) {
-        let rolled = turned.angle.cross(distance.normal).scale(law.radius);
-        let sliding = seen.place - before - rolled;
-        state.traction = friction.traction(&law.carried, distance.normal, normal_force.force, sliding);
+    match law.friction.as_ref().zip(turning) {
+        None => Point { nodes, shape, carrier, distance, law, seen, turned: None, state: &state }.add(weights, out),
+        Some((friction, turning)) => {
+            let turned = &Turned::new(turning, shape, &carrier.rotation.r);
+            let rolled = turned.angle.cross(distance.normal).scale(law.radius);
+            let sliding = seen.place - turned.before(&shape.values) - rolled;
+            state.traction = friction.traction(&law.carried, distance.normal, normal_force.force, sliding);
+            let turned = Some(turned);
+            Point { nodes, shape, carrier, distance, law, seen, turned, state: &state }.add(weights, out);
+        }
     }
-    let point = Point { nodes, shape, carrier, distance, law, seen, turned, state: &state };
-    point.add(weights, out);
     state
 }
 
@@ -220,7 +223,7 @@ struct Point<'a, const N: usize, T> {
     distance: &'a Distance<T>,
     law: &'a ContactLaw,
     seen: Seen<T>,
-    turned: Option<Turned<N, T>>,
+    turned: Option<&'a Turned<'a, N, T>>,
     state: &'a PointState<T>,
 }
 
@@ -234,8 +237,9 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
     const CARRIER: usize = 2 * N;
 
     fn add(&self, weights: Weights, out: &mut ElementSystem<T>) {
-        let force = self.force();
-        let moment = self.moment();
+        let friction = self.traction();
+        let force = self.force(&friction);
+        let moment = self.moment(&friction);
         let arm = self.arm();
         for i in 0..N {
             self.node_forces(i, self.shape.values[i], force.value, moment.value, |row, f| out.add_force(row, f));
@@ -261,22 +265,23 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
     }
 
     /// F = p n + t
-    fn force(&self) -> Derived<T> {
+    fn force(&self, friction: &Derived<T>) -> Derived<T> {
         let n = self.distance.normal;
         let p = self.state.normal_force.force * self.law.weight;
-        let friction = self.traction();
         Derived {
             value: n * p + friction.value,
             over_place: self.distance.curvature * p + friction.over_place,
             over_pressure: n.scale(self.law.weight) + friction.over_pressure,
-            ..friction
+            ..*friction
         }
     }
 
-    /// m = n x t
-    fn moment(&self) -> Derived<T> {
+    /// m = n x t; zero without friction
+    fn moment(&self, friction: &Derived<T>) -> Derived<T> {
+        if self.turned.is_none() {
+            return Derived::zero();
+        }
         let n = self.distance.normal;
-        let friction = self.traction();
         Derived {
             value: n.cross(friction.value),
             over_place: Mat3::skew_mul(n, friction.over_place)
@@ -287,14 +292,14 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         }
     }
 
-    /// t, with da = dy - dy0 + r n~ dtheta - r theta~ H dy.
+    /// t, with da = dy - dy0 + r n~ dtheta - r theta~ H dy; zero without friction.
     fn traction(&self) -> Derived<T> {
+        let Some(turned) = self.turned else { return Derived::zero() };
         let t = &self.state.traction;
         let ContactLaw { radius: r, weight, .. } = *self.law;
         let n = self.distance.normal;
-        let angle = self.turned.as_ref().map_or(Vec3::zero(), |turned| turned.angle);
         let curvature = self.distance.curvature;
-        let slides = Mat3::identity() - Mat3::skew_mul(angle, curvature).scale(r);
+        let slides = Mat3::identity() - Mat3::skew_mul(turned.angle, curvature).scale(r);
         Derived {
             value: t.force.scale(weight),
             over_place: (t.over_sliding * slides + t.over_normal * curvature).scale(weight),
@@ -314,30 +319,31 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
     /// Shows the forces on node `i` for the factor N_i (or its derivative).
     fn node_forces(&self, i: usize, factor: T, force: Vec3<T>, moment: Vec3<T>, mut show: impl FnMut(usize, Vec3<T>)) {
         show(block_of(i), -(self.carrier.rotation.r * force) * factor);
-        if let Some(turned) = &self.turned {
+        if let Some(turned) = self.turned {
             let material = turned.rotations[i].transpose_mul(moment);
-            let rotation = &self.nodes[i].rotation;
-            show(block_of(i) + 1, rotation.t.transpose_mul(material) * (factor * self.law.radius));
+            show(block_of(i) + 1, turned.nodes[i].rotation.t.transpose_mul(material) * (factor * self.law.radius));
         }
     }
 
     /// Adds the derivatives of F, m and b, without those of Q, T and S.
     fn add_columns(&self, force: &Derived<T>, moment: &Derived<T>, weights: Weights, out: &mut ElementSystem<T>) {
+        let mut displacements = [(Self::CARRIER, -T::one()); MAX_NODES + 1];
         for i in 0..N {
-            self.add_column(block_of(i), &self.displacement(self.shape.values[i], weights), force, moment, out);
+            displacements[i] = (block_of(i), self.shape.values[i]);
             if let Some(column) = self.node_rotation(i, weights) {
-                self.add_column(block_of(i) + 1, &column, force, moment, out);
+                self.add_column(&[(block_of(i) + 1, T::one())], &column, force, moment, out);
             }
         }
+        let count = if self.carrier.is_node { N + 1 } else { N };
+        self.add_column(&displacements[..count], &self.displacement(weights), force, moment, out);
         if self.carrier.is_node {
-            self.add_column(Self::CARRIER, &self.displacement(-T::one(), weights), force, moment, out);
-            self.add_column(Self::CARRIER + 1, &self.carrier_rotation(weights), force, moment, out);
+            self.add_column(&[(Self::CARRIER + 1, T::one())], &self.carrier_rotation(weights), force, moment, out);
         }
     }
 
-    /// The column of a displacement that moves the point by `factor` times itself.
-    fn displacement(&self, factor: T, weights: Weights) -> Column<T> {
-        let moved = self.carrier.rotation.r.transpose() * factor;
+    /// The column of a displacement of the point.
+    fn displacement(&self, weights: Weights) -> Column<T> {
+        let moved = self.carrier.rotation.r.transpose();
         let by_rate = self.distance.normal * self.state.normal_force.over_rate;
         let pressure = self.pressure_over_place().scale(weights.stiffness) + by_rate.scale(weights.damping);
         Column { place: moved.scale(weights.stiffness), rolling: Mat3::zero(), pressure: moved.transpose() * pressure }
@@ -345,8 +351,8 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
 
     /// The column of the rotation of node `i`; `None` without friction.
     fn node_rotation(&self, i: usize, weights: Weights) -> Option<Column<T>> {
-        let turned = self.turned.as_ref()?;
-        let spun = turned.maps[i] * (turned.rotations[i] * self.nodes[i].rotation.t);
+        let turned = self.turned?;
+        let spun = turned.maps[i] * (turned.rotations[i] * turned.nodes[i].rotation.t);
         let rolling = spun * (self.shape.values[i] * (weights.stiffness * self.law.radius));
         Some(Column { place: Mat3::zero(), rolling, pressure: Vec3::zero() })
     }
@@ -357,7 +363,7 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let t = self.carrier.rotation.t.scale(weights.stiffness);
         let place = Mat3::skew_mul(self.seen.place, t);
         let mut rolling = Mat3::zero();
-        if let Some(turned) = &self.turned {
+        if let Some(turned) = self.turned {
             for i in 0..N {
                 rolling -= turned.maps[i] * t * (self.shape.values[i] * self.law.radius);
             }
@@ -368,9 +374,10 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         Column { place, rolling, pressure }
     }
 
+    /// Adds a column to blocks, each times its factor.
     fn add_column(
         &self,
-        column_block: usize,
+        blocks: &[(usize, T)],
         column: &Column<T>,
         force: &Derived<T>,
         moment: &Derived<T>,
@@ -379,26 +386,24 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let carrier = &self.carrier.rotation;
         let d_force = force.over(column);
         let spatial = carrier.r * d_force;
+        let mut add =
+            |row: usize, of_row: Mat3<T>| blocks.iter().for_each(|&(block, f)| out.add_tangent(row, block, of_row * f));
         for i in 0..N {
-            out.add_tangent(block_of(i), column_block, -spatial * self.shape.values[i]);
+            add(block_of(i), -spatial * self.shape.values[i]);
         }
-        if let Some(turned) = &self.turned {
+        if let Some(turned) = self.turned {
             let d_moment = moment.over(column);
             for i in 0..N {
                 let factor = self.shape.values[i] * self.law.radius;
                 let material = turned.rotations[i].transpose_matmul(d_moment);
-                out.add_tangent(
-                    block_of(i) + 1,
-                    column_block,
-                    self.nodes[i].rotation.t.transpose_matmul(material) * factor,
-                );
+                add(block_of(i) + 1, turned.nodes[i].rotation.t.transpose_matmul(material) * factor);
             }
         }
         if self.carrier.is_node {
             let d_arm = column.place - self.distance.curvature * column.place.scale(self.law.radius);
             let turned = Mat3::skew_mul(self.arm(), d_force) - Mat3::skew_mul(force.value, d_arm);
-            out.add_tangent(Self::CARRIER, column_block, spatial);
-            out.add_tangent(Self::CARRIER + 1, column_block, carrier.t.transpose_matmul(turned));
+            add(Self::CARRIER, spatial);
+            add(Self::CARRIER + 1, carrier.t.transpose_matmul(turned));
         }
     }
 
@@ -414,11 +419,11 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
             let about = carrier.c2(self.arm().cross(force.value)).scale(weight);
             out.add_tangent(Self::CARRIER + 1, Self::CARRIER + 1, about);
         }
-        let Some(turned) = &self.turned else { return };
+        let Some(turned) = self.turned else { return };
         let m = moment.value;
         for i in 0..N {
             let factor = self.shape.values[i] * (self.law.radius * weight);
-            let node = &self.nodes[i].rotation;
+            let node = &turned.nodes[i].rotation;
             let s = &turned.rotations[i];
             let back = node.t.transpose() * s.transpose() * factor;
             let own = back * Mat3::skew_mul(m, *s * node.t) + node.c2(s.transpose_mul(m)) * factor;
@@ -481,14 +486,14 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
     /// Derivatives over s of what forces depend on.
     fn change_along(&self) -> Change<T> {
         let slopes = &self.shape.slopes;
-        let turned = self.turned.as_ref();
+        let turned = self.turned;
         let velocity = weighted_sum(slopes, |i| self.nodes[i].velocity);
         let faster = self.distance.normal.dot(self.carrier.rotation.r.transpose_mul(velocity));
         Change {
             place: self.seen.tangent,
             rolling: weighted_sum(slopes, |i| turned.map_or(Vec3::zero(), |turned| turned.angles[i]))
                 .scale(self.law.radius),
-            before: weighted_sum(slopes, |i| Vec3::constant(self.nodes[i].before.place)),
+            before: turned.map_or(Vec3::zero(), |turned| turned.before(slopes)),
             pressure: self.pressure_over_place().dot(self.seen.tangent) + faster * self.state.normal_force.over_rate,
         }
     }
@@ -496,4 +501,4 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
 
 /// Blocks over which the place of a closest point has derivatives: displacements of four nodes, and
 /// both blocks of the carrier.
-const MAX_COLUMNS: usize = crate::kernel::element::MAX_NODES + 2;
+const MAX_COLUMNS: usize = MAX_NODES + 2;

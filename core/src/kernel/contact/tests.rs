@@ -7,7 +7,7 @@ use super::friction::{CarriedTraction, FrictionLaw, Status};
 use super::law::NormalLaw;
 use super::point::{Carrier, ContactLaw, Place, PointState, add_point};
 use super::surface::{Surface, tests::shapes};
-use super::variation::{ContactNode, NodeBefore};
+use super::variation::{ContactNode, NodeBefore, NodeTurning};
 use crate::kernel::element::{ElementSystem, Weights};
 use crate::rotation::Rotation;
 use crate::scalar::Real;
@@ -118,14 +118,16 @@ impl Unknowns<D> {
 
 impl<const N: usize> Scene<N> {
     fn nodes<T: Real>(&self, unknowns: &[Unknowns<T>; N]) -> [ContactNode<T>; N] {
-        from_fn(|i| {
-            let body = &self.bodies[i];
-            ContactNode {
-                place: Vec3::constant(body.start) + unknowns[i].u,
-                velocity: unknowns[i].u_rate,
-                rotation: Rotation::new(unknowns[i].p).after(Mat3::constant(body.base)),
-                before: self.before[i],
-            }
+        from_fn(|i| ContactNode {
+            place: Vec3::constant(self.bodies[i].start) + unknowns[i].u,
+            velocity: unknowns[i].u_rate,
+        })
+    }
+
+    fn turning<T: Real>(&self, unknowns: &[Unknowns<T>; N]) -> [NodeTurning<T>; N] {
+        from_fn(|i| NodeTurning {
+            rotation: Rotation::new(unknowns[i].p).after(Mat3::constant(self.bodies[i].base)),
+            before: self.before[i],
         })
     }
 
@@ -165,7 +167,8 @@ impl<const N: usize> Scene<N> {
         let point = carrier.on_surface(weighted_sum(&shape.values, |i| nodes[i].place));
         let distance = self.surface.distance(point).unwrap();
         let mut out = ElementSystem::new(self.blocks());
-        let state = add_point(&nodes, &shape, &carrier, &distance, &self.law, weights, &mut out);
+        let turning = self.turning(unknowns);
+        let state = add_point(&nodes, Some(&turning), &shape, &carrier, &distance, &self.law, weights, &mut out);
         (out, state)
     }
 
@@ -258,7 +261,11 @@ fn random_scene<const N: usize>(random: &mut Random, surface: &Surface, kind: Ki
     let distance = |y: Vec3| surface.distance(y).ok();
     let seen = scene.seen();
     if kind.place == Place::Closest {
-        scene.s = minima(&seen, &distance).found().iter().find(|minimum| minimum.kind != MinimumKind::Kink)?.s;
+        scene.s = minima(&seen, scene.surface.intervals(&seen), &distance)
+            .found()
+            .iter()
+            .find(|minimum| minimum.kind != MinimumKind::Kink)?
+            .s;
     }
     let shape = ShapeAt::<N>::new(scene.s);
     let here = distance(weighted_sum(&shape.values, |i| seen[i]))?;
@@ -430,7 +437,7 @@ fn projected<const N: usize>(scene: &Scene<N>, unknown: usize, change: f64) -> V
         ..*scene
     };
     let distance = |y: Vec3| changed.surface.distance(y).ok();
-    let found = minima(&changed.seen(), &distance);
+    let found = minima(&changed.seen(), changed.surface.intervals(&changed.seen()), &distance);
     let nearest = found.found().iter().map(|minimum| minimum.s).min_by(|a, b| {
         let apart = |s: &f64| (s - scene.s).abs();
         apart(a).total_cmp(&apart(b))

@@ -5,7 +5,7 @@
 //! state by theta_i = log(S_i S0_i^T), and d(theta_i) = T(theta_i)^-T times the spin of S_i. The
 //! rolling of a contact is Theta = sum N_i r theta_i, a length: with the radius r as arm.
 
-use super::along::ShapeAt;
+use super::along::{ShapeAt, weighted_sum};
 use crate::rotation::{Rotation, log};
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
@@ -35,14 +35,21 @@ pub struct ContactNode<T = f64> {
     pub(crate) place: Vec3<T>,
     /// dx/dt; zero in statics
     pub(crate) velocity: Vec3<T>,
+}
+
+/// What friction needs of a node.
+#[derive(Clone, Copy, Debug)]
+pub struct NodeTurning<T = f64> {
     /// Its rotation, with the tensor T of the unknown
     pub(crate) rotation: Rotation<T>,
-    /// The node at the last converged state; only friction needs it
+    /// The node at the last converged state
     pub(crate) before: NodeBefore,
 }
 
 /// Rotations of the nodes as the carrier sees them, for friction.
-pub(super) struct Turned<const N: usize, T> {
+pub(super) struct Turned<'a, const N: usize, T> {
+    /// R_i, T_i and S0_i
+    pub(super) nodes: &'a [NodeTurning<T>; N],
     /// S_i
     pub(super) rotations: [Mat3<T>; N],
     /// theta_i
@@ -53,9 +60,10 @@ pub(super) struct Turned<const N: usize, T> {
     pub(super) angle: Vec3<T>,
 }
 
-impl<const N: usize, T: Real> Turned<N, T> {
-    pub(super) fn new(nodes: &[ContactNode<T>; N], shape: &ShapeAt<N, T>, q: &Mat3<T>) -> Self {
+impl<'a, const N: usize, T: Real> Turned<'a, N, T> {
+    pub(super) fn new(nodes: &'a [NodeTurning<T>; N], shape: &ShapeAt<N, T>, q: &Mat3<T>) -> Self {
         let mut out = Self {
+            nodes,
             rotations: [Mat3::zero(); N],
             angles: [Vec3::zero(); N],
             maps: [Mat3::zero(); N],
@@ -71,9 +79,15 @@ impl<const N: usize, T: Real> Turned<N, T> {
         }
         out
     }
+
+    /// The sum of y0_i times factors.
+    pub(super) fn before(&self, factors: &[T; N]) -> Vec3<T> {
+        weighted_sum(factors, |i| Vec3::constant(self.nodes[i].before.place))
+    }
 }
 
 /// A force or moment with its derivatives: over y at constant p, Theta, y0 and p.
+#[derive(Clone, Copy)]
 pub(super) struct Derived<T> {
     pub(super) value: Vec3<T>,
     pub(super) over_place: Mat3<T>,
@@ -101,6 +115,11 @@ pub(super) struct Column<T> {
 }
 
 impl<T: Real> Derived<T> {
+    pub(super) fn zero() -> Self {
+        let (o, matrix) = (Vec3::zero(), Mat3::zero());
+        Self { value: o, over_place: matrix, over_rolling: matrix, over_before: matrix, over_pressure: o }
+    }
+
     pub(super) fn by(&self, change: &Change<T>) -> Vec3<T> {
         self.over_place * change.place
             + self.over_rolling * change.rolling
