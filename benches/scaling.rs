@@ -148,7 +148,7 @@ fn row(elements: usize, dynamic: bool, interpolation: &str) {
     );
 }
 
-/// What a beam lies on with all its nodes, a little inside.
+/// Grounds on which a beam lies with all its nodes, a little inside.
 const GROUNDS: [&str; 3] = ["plane", "cylinder", "beam"];
 
 /// The section and the beam `b` along a path, held at its start.
@@ -204,7 +204,7 @@ fn evaluation_seconds(deck: &str) -> [f64; 2] {
     [Weights::STIFFNESS, Weights::NONE].map(|weights| quickest(|| assembly.evaluate(&state, weights, None)))
 }
 
-/// What points in contact cost in an evaluation, in nanoseconds a point.
+/// Prints nanoseconds a point of contact takes in an evaluation.
 fn contact_row(elements: usize, on: &str, friction: f64) {
     let [scene, contact] = deck_in_contact(elements, on, friction);
     let [without, with] = [scene.clone(), scene + &contact].map(|deck| evaluation_seconds(&deck));

@@ -9,6 +9,7 @@ use beamsim_core::model::beam_element::PlacedNode;
 use beamsim_core::model::{Assembly, Schedule, StageKind};
 use beamsim_core::system::ContactRegime;
 use beamsim_core::tensor::Vec3;
+use beamsim_core::warning::WarningKind;
 
 /// A beam from one place to another.
 pub struct Bar {
@@ -708,6 +709,7 @@ fn bars_that_cross_at_small_angles_exchange_their_velocities() {
 #[test]
 fn ends_do_not_go_through_beams_in_one_level() {
     let mut random = Random::new(98);
+    let mut compared = 0;
     for case in 0..12 {
         let beyond = random.range(0.0, 0.012);
         let force = random.range(1.5, 6.0);
@@ -737,6 +739,59 @@ fn ends_do_not_go_through_beams_in_one_level() {
                 (at_once - in_six).abs() < 1e-2 * in_six.max(0.1),
                 "case {case}: {at_once}, in six levels {in_six}"
             );
+            compared += usize::from(in_six > 0.1);
         }
     }
+    assert!(compared >= 8, "{compared}");
+}
+
+/// Bars that come near each other from afar in one level or step, and touch or do not: nothing has been passed.
+#[test]
+fn approaches_from_afar_pass_nothing() {
+    let (radius, section) =
+        (0.01, "[section.s]\nEA = 1e6\nGA = 4e5\nGJ = 500\nEI = 500\nrhoA = 0.5\nrhoJ = [1e-4, 5e-5, 5e-5]\n");
+    for (from, to) in [(6.0, 1.02), (8.0, 0.999), (20.0, 2.0), (50.0, 5.0), (100.0, 10.0)] {
+        let height = 2.0 * radius * from;
+        let way = 2.0 * radius * (from - to);
+        let bar = |ends: [Vec3; 2]| Bar { ends, elements: 4, order: 1, radius };
+        let first = bar([Vec3([-0.5, 0.0, 0.0]), Vec3([0.5, 0.0, 0.0])]);
+        let second = bar([Vec3([0.0, -0.5, height]), Vec3([0.0, 0.5, height])]);
+        let pressed = simulate(&pushed(&first, &second, Vec3([0.0, 0.0, -way]), 1));
+        assert_eq!(pressed.counters.cutbacks, 0, "from {from} to {to}");
+        let deck = [
+            section,
+            &first.deck("a"),
+            &second.deck("b"),
+            &format!("[[initial]]\nbeam = \"b\"\nvelocity = [0, 0, {}]\n", -way / 1e-3),
+            &format!("[[contact]]\nname = \"c\"\nbeams = [\"a\"]\nwith = [\"b\"]\nradius = {radius}\n"),
+            "[[stage]]\nkind = \"dynamic\"\nend = 1e-3\nstep = 1e-3\n[output]\nnodes = [\"b@start\"]\ncolumns = [\"x\"]\n",
+        ];
+        let flown = simulate(&deck.concat());
+        assert_eq!(flown.counters.cutbacks, 0, "from {from} to {to}");
+    }
+}
+
+/// Bars of one element that cross at an angle so small that their ends carry all of the force: the overlap in
+/// between is told.
+#[test]
+fn penetrations_between_points_are_told_in_dynamic_stages() {
+    let told = |stiffness: &str, elements: usize| {
+        let angle = 0.0033_f64;
+        let (sin, cos) = angle.sin_cos();
+        let bar = |ends: [[f64; 3]; 2]| Bar { ends: ends.map(Vec3), elements, order: 1, radius: 0.017 };
+        let deck = [
+            "[section.s]\nEA = 1e8\nGA = 1e8\nGJ = 1e6\nEI = 1e6\nrhoA = 1\nrhoJ = [1e-3, 5e-4, 5e-4]\n",
+            &bar([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]]).deck("a"),
+            &bar([[-0.5 * cos, -0.5 * sin, 0.0341], [0.5 * cos, 0.5 * sin, 0.0341]]).deck("b"),
+            "[[initial]]\nbeam = \"b\"\nvelocity = [0, 0, -0.1]\n",
+            &format!(
+                "[[contact]]\nname = \"c\"\nbeams = [\"a\"]\nwith = [\"b\"]\nradius = 0.017\nstiffness = {stiffness}\n"
+            ),
+            "[[stage]]\nkind = \"dynamic\"\nend = 5e-3\nstep = 1e-5\n[output]\nnodes = [\"b@start\"]\ncolumns = [\"x\"]\n",
+        ];
+        let warned = attempt(&deck.concat()).counters.findings.warnings;
+        warned.iter().any(|warning| warning.kind == WarningKind::HiddenPenetration)
+    };
+    assert!(told("5e8", 1));
+    assert!(!told("5e6", 100));
 }

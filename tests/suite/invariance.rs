@@ -422,3 +422,38 @@ step = "0.02*sec"
         }
     }
 }
+
+/// A body that flies and tumbles alone, in units of length from a millionth to a hundred million: the length of the scene
+/// is its radius of gyration. Convergence was judged by a length of 1.
+#[test]
+fn a_single_body_moves_alike_in_any_unit() {
+    let in_unit = |unit: f64| {
+        let length = |value: f64| format!("{:?}", value * unit);
+        let inertia = |value: f64| format!("{:?}", value * unit * unit);
+        let deck = format!(
+            "gravity = [0, 0, {}]\n[point]\np = [0, 0, 0]\n[[body]]\nat = \"p\"\nmass = 2\noffset = [{}, 0, {}]\n\
+             inertia = [[{}, 0, 0], [0, {}, 0], [0, 0, {}]]\n[[initial]]\nat = \"p\"\nvelocity = [{}, 0, 0]\n\
+             spin = [1, 5, 0.1]\n[[stage]]\nkind = \"dynamic\"\nend = 2\nstep = 0.02\n[output]\nnodes = [\"p\"]\ncolumns = [\"x\"]\n",
+            length(-9.81),
+            length(0.1),
+            length(0.05),
+            inertia(0.4),
+            inertia(0.6),
+            inertia(0.7),
+            length(3.0),
+        );
+        let simulation = simulate(&deck);
+        let places = simulation.vector("p.").map(|place| place / unit);
+        (simulation.counters.work.iterations, simulation.counters.cutbacks, places)
+    };
+    let (iterations, cutbacks, places) = in_unit(1.0);
+    for unit in [1e-6, 1e-3, 1e3, 1e8] {
+        let (other_iterations, other_cutbacks, other_places) = in_unit(unit);
+        println!("{unit}: {other_iterations} iterations, {other_cutbacks} cut-backs, {other_places:?}, not {places:?}");
+        assert!(
+            other_iterations.abs_diff(iterations) <= 2 && other_cutbacks == cutbacks,
+            "{unit}: {other_iterations}, not {iterations}"
+        );
+        assert!(distance(other_places, places) < 1e-9, "{unit}: {other_places:?}, not {places:?}");
+    }
+}

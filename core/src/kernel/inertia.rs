@@ -20,8 +20,8 @@ pub struct Inertia<T = f64> {
 }
 
 impl Inertia {
-    /// A length: the radius of gyration about the node or the centre line; zero without mass.
-    pub fn size(&self) -> f64 {
+    /// The radius of gyration about the node or the centre line; zero without mass.
+    pub fn radius_of_gyration(&self) -> f64 {
         let [xx, yy, zz] = [0, 1, 2].map(|k| self.about_node.0[k][k]);
         if self.mass > 0.0 { (0.5 * (xx + yy + zz) / self.mass).sqrt() } else { 0.0 }
     }

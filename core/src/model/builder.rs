@@ -415,7 +415,7 @@ impl ModelBuilder {
         self.add_beams(&mut effects);
         effects.push(!self.springs.is_empty(), GroundSprings { springs: self.springs.clone() });
         effects.push(!self.links.is_empty(), Links { links: self.links });
-        let sizes = self.bodies.iter().map(|body| body.inertia.size()).collect();
+        let sizes = self.bodies.iter().map(|body| body.inertia.radius_of_gyration()).collect();
         let bodies = RigidBody { name: "rigid body inertia", bodies: self.bodies, gyroscopic: true };
         effects.push(!bodies.bodies.is_empty(), bodies);
         for kind in [

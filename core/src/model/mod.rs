@@ -152,7 +152,7 @@ pub struct Model {
     pub plane: Option<Plane>,
     /// True where static and dynamic stages are linear in the displacements
     pub linear: bool,
-    /// The length to which displacements are compared: the diagonal of the scene's box, or 1
+    /// The length to which displacements are compared: the largest distance of two nodes, the radius of bodies, or 1
     pub length: f64,
 }
 

@@ -73,28 +73,28 @@ impl ModelParts {
     fn length_of(&self, nodes: &[PlacedNode]) -> f64 {
         let places: Vec<Vec3> = nodes.iter().map(|node| node.place).collect();
         let bodies = || self.sizes.iter().copied().fold(0.0, f64::max);
-        let length = Some(extent(&places)).filter(|length| *length > 0.0).unwrap_or_else(bodies);
+        let length = Some(largest_distance(&places)).filter(|length| *length > 0.0).unwrap_or_else(bodies);
         if length.is_finite() && length > 0.0 { length } else { 1.0 }
     }
 }
 
-/// Looks for a place farther away from the last one.
-const MOST_LOOKS: usize = 8;
+/// Steps from one place to the one that is the farthest from it, at most.
+const MOST_STEPS: usize = 8;
 
 /// The distance of two places that are the farthest from each other, or nearly so, found from the mean place on. Unlike
 /// the box around the places it does not depend on how the axes lie.
-fn extent(places: &[Vec3]) -> f64 {
+fn largest_distance(places: &[Vec3]) -> f64 {
     let mean = places.iter().fold(Vec3::ZERO, |sum, place| sum + *place) * (1.0 / places.len().max(1) as f64);
     let (mut from, mut length) = (mean, 0.0);
-    for look in 0..MOST_LOOKS {
+    for step in 0..MOST_STEPS {
         let distance = |place: &Vec3| (*place - from).norm();
         let Some(farthest) = places.iter().copied().max_by(|a, b| distance(a).total_cmp(&distance(b))) else { break };
         let apart = distance(&farthest);
-        // The first look is from the mean.
-        if look > 0 && apart <= length {
+        // The first step is from the mean.
+        if step > 0 && apart <= length {
             break;
         }
-        length = if look > 0 { apart } else { 0.0 };
+        length = if step > 0 { apart } else { 0.0 };
         from = farthest;
     }
     length
@@ -105,20 +105,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_extent_is_that_of_the_farthest_places() {
+    fn the_largest_distance_is_that_of_the_farthest_places() {
         let at = |x: f64, y: f64| Vec3([x, y, 0.0]);
-        assert_eq!(extent(&[]), 0.0);
-        assert_eq!(extent(&[at(3.0, 1.0); 2]), 0.0);
-        assert_eq!(extent(&[at(0.0, 0.0), at(1.0, 0.0), at(10.0, 0.0)]), 10.0);
+        assert_eq!(largest_distance(&[]), 0.0);
+        assert_eq!(largest_distance(&[at(3.0, 1.0); 2]), 0.0);
+        assert_eq!(largest_distance(&[at(0.0, 0.0), at(1.0, 0.0), at(10.0, 0.0)]), 10.0);
         // A frame has the diagonal of its box.
         let frame = [at(0.0, 0.0), at(0.0, 3.0), at(4.0, 3.0), at(4.0, 0.0)];
-        assert_eq!(extent(&frame), 5.0);
+        assert_eq!(largest_distance(&frame), 5.0);
         // In any axes.
         for angle in [0.3, 1.0, 2.4] {
             let (sin, cos) = (libm::sin(angle), libm::cos(angle));
             let turned =
                 frame.map(|place| at(cos * place.0[0] - sin * place.0[1], sin * place.0[0] + cos * place.0[1]));
-            assert!((extent(&turned) - 5.0).abs() < 1e-14);
+            assert!((largest_distance(&turned) - 5.0).abs() < 1e-14);
         }
     }
 }

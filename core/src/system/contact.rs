@@ -44,7 +44,8 @@ pub struct ContactMemory {
     pub(crate) damping_power: f64,
     /// The largest penetration in the present dynamic stage, over the one that is allowed
     pub(crate) deepest: f64,
-    /// The same of beams with beams anywhere, also between the points that carry forces
+    /// The largest penetration of beams into beams between the points that carry forces, over the one that is
+    /// allowed, in the present dynamic stage; zero where those points are hardly less deep
     pub(crate) deepest_between: f64,
     /// The number of steps of the shortest contact in the present dynamic stage, from the step with
     /// its first force to the last one; none if no contact has ended

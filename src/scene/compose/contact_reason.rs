@@ -1,4 +1,4 @@
-//! What `check` tells of contacts: what may touch what, and what passes through each other.
+//! The reason of contacts that `check` tells: the pairs that may touch, and those that pass through each other.
 
 use crate::deck::{self, Deck, Spanned};
 use beamsim_core::effect::contact::SurfaceContacts;
@@ -6,6 +6,9 @@ use std::collections::BTreeSet;
 
 /// Pairs of beams that are named in the reason of contacts, at most.
 const NAMED_PAIRS: usize = 6;
+
+/// Names in all contacts up to which pairs without a contact are listed.
+const MOST_PARTIES: usize = 64;
 
 /// The reason of contacts, with what may touch what.
 pub(super) fn reason_of(deck: &Deck, out: &SurfaceContacts) -> String {
@@ -65,7 +68,7 @@ fn idle_names(deck: &Deck) -> Vec<&Spanned<String>> {
     beams.chain(bodies).chain(surfaces).filter(|name| !named.contains(&name.value)).collect()
 }
 
-/// Those that contacts name.
+/// Beams, bodies and surfaces that contacts name.
 #[derive(Default)]
 struct Parties<'a> {
     beams: Vec<&'a str>,
@@ -100,6 +103,9 @@ impl<'a> Parties<'a> {
             add(&mut out.bodies, values(&contact.nodes));
             add(&mut out.surfaces, values(&contact.surfaces));
         }
+        // A body does not touch the surface that it carries.
+        let carried = deck.surfaces.iter().filter_map(|table| Some([table.on.as_ref()?, &table.name]));
+        out.met.extend(carried.map(|pair| pair.map(|name| name.value.as_str())));
         out
     }
 
@@ -113,8 +119,15 @@ impl<'a> Parties<'a> {
     }
 }
 
-/// Which of those that contacts name pass through each other, since none names both; none where all pairs are named.
+/// The pairs of parties that pass through each other, since no contact names both; none where all pairs are named, or
+/// there are so many parties that their pairs are beyond a list.
 fn apart(deck: &Deck) -> Option<String> {
+    let counted = |contact: &deck::Contact| {
+        contact.beams.len() + contact.nodes.len() + contact.with.len() + contact.surfaces.len()
+    };
+    if deck.contacts.iter().map(counted).sum::<usize>() > MOST_PARTIES {
+        return None;
+    }
     let parties = Parties::of(deck);
     let pairs = parties.apart();
     let named = |[a, b]: &[&str; 2]| if a == b { format!("{a} and itself") } else { format!("{a} and {b}") };

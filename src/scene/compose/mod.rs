@@ -90,8 +90,9 @@ pub struct Composition {
 impl Composition {
     /// Lengths of bodies: radii of gyration and of contact.
     pub fn sizes(&self) -> Vec<f64> {
-        let of_contacts = self.contacts.iter().flat_map(|contacts| &contacts.chains).map(|chain| chain.strand.radius);
-        self.bodies.iter().map(|body| body.inertia.size()).chain(of_contacts).collect()
+        let chains = self.contacts.iter().flat_map(|contacts| &contacts.chains);
+        let of_contacts = chains.filter(|chain| chain.strand.beam.is_none()).map(|chain| chain.strand.radius);
+        self.bodies.iter().map(|body| body.inertia.radius_of_gyration()).chain(of_contacts).collect()
     }
 }
 

@@ -13,7 +13,7 @@ use super::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
 use super::strand::{ChainNode, Strand};
 use super::surface::SceneSurface;
 use crate::kernel::MAX_NODES;
-use crate::kernel::contact::along::{intervals_of_convex, weighted_sum};
+use crate::kernel::contact::along::{intervals_of_convex, place_on, weighted_sum};
 use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
 use crate::system::{ChainMemory, Clearance, ContactRegime, PointMemory, State};
 use crate::tensor::Vec3;
@@ -250,7 +250,7 @@ fn relation(before: &PointMemory, now: &Candidate, are_alike: bool) -> Relation 
     match (before.edge, now.edge) {
         (before, now) if before == now && are_alike => Relation::Same,
         (Some(_), Some(_)) => Relation::OtherEdge,
-        (Some(_) | None, Some(_) | None) => Relation::OtherFeature,
+        (None, _) | (_, None) => Relation::OtherFeature,
     }
 }
 
@@ -357,13 +357,7 @@ impl SeenChain<'_> {
 
     /// The place of a point of element `k`.
     fn place(&self, k: usize, s: f64) -> Vec3 {
-        match self.places_of(k) {
-            [a, b] => weighted_sum(&ShapeAt::<2>::new(s).values, |i| [*a, *b][i]),
-            [a, b, c] => weighted_sum(&ShapeAt::<3>::new(s).values, |i| [*a, *b, *c][i]),
-            [a, b, c, d, ..] => weighted_sum(&ShapeAt::<4>::new(s).values, |i| [*a, *b, *c, *d][i]),
-            [a] => *a,
-            [] => Vec3::ZERO,
-        }
+        place_on(self.places_of(k), s)
     }
 
     /// The derivative of the place on element `k` over s.

@@ -190,6 +190,13 @@ impl<'a> ChainNow<'a> {
         candidate.distance(&self.surface.surface, seen).map_or(f64::INFINITY, |it| it.value) - self.chain.radius
     }
 
+    /// The direction of an element from its first node to its last one, in the axes of the carrier.
+    pub(super) fn chord(&self, element: usize) -> Vec3 {
+        let nodes = self.chain.nodes_of(element);
+        let [from, to] = [&nodes[0], &nodes[nodes.len() - 1]].map(|node| self.carrier.sees(self.node(node).place));
+        (to - from).normalized().unwrap_or(Vec3::ZERO)
+    }
+
     /// The place of a candidate (global components).
     fn place(&self, candidate: &Candidate) -> Vec3 {
         self.place_in(candidate, self.at)

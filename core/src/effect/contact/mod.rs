@@ -54,6 +54,9 @@ const LARGEST_TURN_IN_FRICTION: f64 = 0.25;
 /// The same where beams are near and none rubs on the surface: they are looked for along chords.
 const LARGEST_TURN_NEARBY: f64 = 1.0;
 
+/// The cosine between a force and an element up to which it pushes the element aside.
+const MOST_ALONG: f64 = 0.8;
+
 /// All contacts with rigid surfaces, and of beams with each other.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceContacts {
@@ -254,7 +257,8 @@ impl SurfaceContacts {
         strayed
     }
 
-    /// A slot of an element that crosses a box or a mesh, and that no point pushes out.
+    /// A slot of an element that crosses a box or a mesh, and that no point pushes out: a force along the element, as
+    /// of a node on the next face, does not.
     fn crossing(&self, number: usize, at: &State) -> Option<Slot> {
         let (chain, surface) = (&self.chains[number], &self.surfaces[self.chains[number].surface]);
         if !surface.surface.has_edges() || !self.is_near(number, at) {
@@ -265,8 +269,11 @@ impl SurfaceContacts {
             return None;
         }
         let mut pushed = Vec::new();
-        self.chain_now(number, at, Weights::NONE).each_point(Weights::NONE, &mut |point, _| {
-            pushed.extend((point.state.normal_force.force > 0.0).then_some(point.candidate.element));
+        let now = self.chain_now(number, at, Weights::NONE);
+        now.each_point(Weights::NONE, &mut |point, _| {
+            let element = point.candidate.element;
+            let is_across = || now.chord(element).dot(point.state.normal).abs() < MOST_ALONG;
+            pushed.extend((point.state.normal_force.force > 0.0 && is_across()).then_some(element));
         });
         let lost = crossings.into_iter().find(|crossing| !pushed.contains(&crossing.element))?;
         Some(chain.nodes_of(lost.element)[0].node.u)

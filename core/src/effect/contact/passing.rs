@@ -1,13 +1,14 @@
 //! Beams and bodies that pass through a surface, or out of it on another side, within one step.
 
-use super::chain::{Chain, SHORTEST_LOOK};
+use super::chain::{Chain, REACH, SHORTEST_LOOK};
 use super::surface::SceneSurface;
 use crate::kernel::Weights;
 use crate::kernel::contact::Surface;
+use crate::kernel::contact::along::place_on;
 use crate::system::State;
 use crate::tensor::Vec3;
 
-/// Places of an element whose ways are looked at, at most, beside its nodes.
+/// Places between two nodes of an element whose ways are looked at, at most.
 const MOST_PLACES: f64 = 32.0;
 
 /// The number of a node of a chain at which the beam or body may have passed through a surface on the way
@@ -21,8 +22,11 @@ pub(super) fn passed(chain: &Chain, surface: &SceneSurface, from: &State, to: &S
     let way = Way { surface: &surface.surface, radius: chain.radius, depth };
     let node = before.iter().zip(&after).position(|(before, after)| way.passes(*before, *after));
     node.or_else(|| {
-        let ends = before.windows(2).zip(after.windows(2));
-        ends.map(|(before, after)| way.chord_passes([before[0], before[1]], [after[0], after[1]])).position(|it| it)
+        let order = chain.order;
+        let elements = 0..if order == 0 { 0 } else { chain.elements() };
+        let nodes = |k: usize| k * order..=(k + 1) * order;
+        let passes = |&k: &usize| way.element_passes(&before[nodes(k)], &after[nodes(k)]);
+        Some(elements.into_iter().find(passes)? * order)
     })
 }
 
@@ -55,21 +59,26 @@ impl Way<'_> {
         moved > reach && has_turned
     }
 
-    /// The same for places on the chord between two nodes, so near to each other that the surface does not
-    /// fit between them, unless the chord is longer than 32 times its thickness.
-    fn chord_passes(&self, before: [Vec3; 2], after: [Vec3; 2]) -> bool {
-        let moved = (after[0] - before[0]).norm().max((after[1] - before[1]).norm());
-        if moved <= self.radius.min(self.depth) {
+    /// The same for places on an element, so near to each other that the surface does not fit between them,
+    /// unless the part between two nodes is longer than 32 times its thickness. `before`, `after`: of its nodes.
+    fn element_passes(&self, before: &[Vec3], after: &[Vec3]) -> bool {
+        let factor = REACH[before.len()];
+        let moved = before.iter().zip(after).map(|(before, after)| (*after - *before).norm()).fold(0.0, f64::max);
+        if factor * moved <= self.radius.min(self.depth) {
             return false;
         }
-        let between = |ends: [Vec3; 2], at: f64| ends[0] + (ends[1] - ends[0]) * at;
-        let length = (before[1] - before[0]).norm().max((after[1] - after[0]).norm());
-        let reach = 0.5 * length + moved + self.radius;
-        if self.surface.distance(between(before, 0.5)).is_ok_and(|distance| distance.value > reach) {
+        let length_of = |nodes: &[Vec3]| nodes.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum::<f64>();
+        let length = length_of(before).max(length_of(after));
+        let middle = place_on(before, 0.5);
+        let farthest = before.iter().map(|node| (*node - middle).norm()).fold(0.0, f64::max);
+        let reach = factor * (farthest + moved) + self.radius;
+        if self.surface.distance(middle).is_ok_and(|distance| distance.value > reach) {
             return false;
         }
-        let places = (length / (self.radius + self.depth)).ceil().clamp(2.0, MOST_PLACES) as usize;
-        (1..places).map(|k| k as f64 / places as f64).any(|at| self.passes(between(before, at), between(after, at)))
+        let parts = (before.len() - 1) as f64;
+        let places = (length / parts / (self.radius + self.depth)).ceil().clamp(2.0, MOST_PLACES) * parts;
+        let between = (1..places as usize).map(|k| k as f64 / places);
+        between.into_iter().any(|at| self.passes(place_on(before, at), place_on(after, at)))
     }
 }
 

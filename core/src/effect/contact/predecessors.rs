@@ -45,7 +45,7 @@ impl Link {
 }
 
 /// The order in which links are taken.
-fn order(a: &Link, b: &Link) -> Ordering {
+fn by_closeness(a: &Link, b: &Link) -> Ordering {
     a.relation.cmp(&b.relation).then(a.shift.total_cmp(&b.shift)).then(a.numbers().cmp(&b.numbers()))
 }
 
@@ -56,7 +56,7 @@ fn take_mutual(links: &[Link], found: &mut [Predecessors], is_taken: &mut [bool]
     let mut of_points: Vec<Option<&Link>> = vec![None; is_taken.len()];
     for link in links.iter().filter(|link| link.relation != Relation::Beside) {
         for first in [&mut of_candidates[link.candidate], &mut of_points[link.point]] {
-            if first.is_none_or(|first| order(link, first).is_lt()) {
+            if first.is_none_or(|first| by_closeness(link, first).is_lt()) {
                 *first = Some(link);
             }
         }
@@ -86,7 +86,7 @@ impl Predecessors {
         let mut is_taken = vec![false; points];
         take_mutual(&links, &mut found, &mut is_taken);
         links.retain(|link| !is_taken[link.point]);
-        links.sort_by(order);
+        links.sort_by(by_closeness);
         for link in links.iter().filter(|link| link.relation != Relation::Beside) {
             let own = &mut found[link.candidate].own;
             if own.is_none() && !is_taken[link.point] {
@@ -174,5 +174,41 @@ mod tests {
         let turned = [point(x, z, true, 1.0), point(y, -z, true, 1.0)];
         let of = |number: usize| &turned[number];
         assert_eq!(predecessors.traction(1.0, &of).force, x);
+    }
+
+    /// The assignment by sorting all links, of which most are taken at once.
+    fn sorted(mut links: Vec<Link>, candidates: usize, points: usize) -> Vec<Option<usize>> {
+        let mut own = vec![None; candidates];
+        let mut is_taken = vec![false; points];
+        links.sort_by(by_closeness);
+        for link in links.iter().filter(|link| link.relation != Relation::Beside) {
+            if own[link.candidate].is_none() && !is_taken[link.point] {
+                own[link.candidate] = Some(link.point);
+                is_taken[link.point] = true;
+            }
+        }
+        own
+    }
+
+    #[test]
+    fn links_are_taken_as_if_all_were_sorted() {
+        use crate::kernel::contact::dual::Random;
+        let mut random = Random(31);
+        for _ in 0..500 {
+            let [candidates, points] = [0, 1].map(|_| random.between(1.0, 6.99) as usize);
+            let relations = [Relation::Same, Relation::OtherEdge, Relation::OtherFeature, Relation::Beside];
+            let mut links = Vec::new();
+            for candidate in 0..candidates {
+                for point in 0..points {
+                    // Few different shifts, so that many are equal.
+                    let shift = random.between(0.0, 2.99).floor() / 2.0;
+                    if random.between(0.0, 1.0) < 0.6 {
+                        links.push(link(candidate, point, relations[random.between(0.0, 3.99) as usize], shift));
+                    }
+                }
+            }
+            let found = Predecessors::of(links.clone(), candidates, points);
+            assert_eq!(found.iter().map(|p| p.own).collect::<Vec<_>>(), sorted(links, candidates, points));
+        }
     }
 }

@@ -10,7 +10,6 @@
 
 use super::distance::Distance;
 use super::minimum::{Slopes, interior_minima};
-use crate::kernel::element::MAX_NODES;
 use crate::scalar::Real;
 use crate::tensor::Vec3;
 
@@ -31,9 +30,11 @@ const MIN_SURFACE_BEND: f64 = 0.1;
 /// At a smooth minimum F_s is below this part of |y'|.
 const MAX_SLOPE: f64 = 1e-9;
 
-/// The largest number of minima between the ends of an element: the order of the element, and one
-/// more for each interval that is searched.
-pub const MAX_MINIMA: usize = 2 * (MAX_NODES - 1);
+/// The largest number of parts of an element in which minima are looked for.
+pub const MOST_INTERVALS: usize = 24;
+
+/// The largest number of minima between the ends of an element: neighbouring parts cannot both have one.
+pub const MAX_MINIMA: usize = MOST_INTERVALS / 2;
 
 /// Lagrange shape functions of N equally spaced nodes at a point s in [0, 1].
 #[derive(Clone, Copy, Debug)]
@@ -154,6 +155,17 @@ impl Bend {
         }
         let is_sharp = second >= MIN_OWN_BEND * self.of_surface && self.of_surface >= MIN_SURFACE_BEND * second;
         Some(if is_sharp { MinimumKind::Sharp } else { MinimumKind::Conforming })
+    }
+}
+
+/// The place at s of an element of two to four nodes, or of a single node.
+pub fn place_on(nodes: &[Vec3], s: f64) -> Vec3 {
+    match *nodes {
+        [] => Vec3::ZERO,
+        [a] => a,
+        [a, b] => weighted_sum(&ShapeAt::<2>::new(s).values, |i| [a, b][i]),
+        [a, b, c] => weighted_sum(&ShapeAt::<3>::new(s).values, |i| [a, b, c][i]),
+        [a, b, c, d, ..] => weighted_sum(&ShapeAt::<4>::new(s).values, |i| [a, b, c, d][i]),
     }
 }
 

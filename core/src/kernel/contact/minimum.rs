@@ -10,8 +10,8 @@ pub struct Slopes {
     pub(super) second: f64,
 }
 
-/// Brackets below this width have no room for another point.
-const RESOLUTION: f64 = 1e-16;
+/// Brackets between neighbouring numbers below 1 are no wider.
+const RESOLUTION: f64 = f64::EPSILON;
 
 /// The largest step of Newton's method that is the last one: the error behind it is about the square.
 const LAST_STEP: f64 = 1e-9;

@@ -26,7 +26,7 @@
 //! pieces are. There the piece of the lower number is taken. [`Undefined`] names the points without
 //! a normal.
 
-use super::along::intervals_of_convex;
+use super::along::{MOST_INTERVALS, intervals_of_convex};
 use super::cone::Cone;
 use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, Side, Undefined, cylinder, plane, sphere};
 use super::mesh::TriangleMesh;
@@ -35,9 +35,8 @@ use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
-/// Parts of an element as long as the radius of a surface in which minima are looked for, and their largest number.
+/// Parts of an element as long as the radius of a surface in which minima are looked for.
 const INTERVALS_OF_RADIUS: f64 = 6.0;
-const MOST_INTERVALS: f64 = 24.0;
 
 /// The shape of a rigid surface, in the axes of its carrier. Directions are unit vectors, radii and
 /// half lengths positive.
@@ -115,20 +114,21 @@ impl Surface {
 
     /// Parts of an element, each of which has one local minimum of the distance at most. Along a straight
     /// element the distance from a convex body is a convex function outside, and a concave one inside. Elsewhere it
-    /// rises and falls on ways as long as the radius.
+    /// rises and falls on ways as long as the radius, of which there are more in elements of four radii.
     pub fn intervals<const N: usize>(&self, nodes: &[Vec3; N]) -> usize {
+        let at_least = 2 * N.saturating_sub(1);
         let is_convex = match &self.shape {
             Shape::Plane { .. } | Shape::Sphere { .. } | Shape::Cylinder { .. } | Shape::Cone(_) => true,
             Shape::Torus { .. } | Shape::Tube(_) => false,
             // Edges have minima of their own.
-            Shape::Box { .. } | Shape::Mesh(_) => return 2 * N.saturating_sub(1),
+            Shape::Box { .. } | Shape::Mesh(_) => return at_least,
         };
         if is_convex && N == 2 {
             return intervals_of_convex(N);
         }
         let chords: f64 = nodes.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
-        let needed = (INTERVALS_OF_RADIUS * chords / self.shape.depth()).min(MOST_INTERVALS);
-        (2 * N.saturating_sub(1)).max(needed as usize)
+        let needed = INTERVALS_OF_RADIUS * chords / self.shape.depth();
+        at_least.max((needed as usize).min(MOST_INTERVALS))
     }
 
     /// The signed distance of a point, also where it has no normal: on an axis, at a centre. There

@@ -37,7 +37,7 @@ pub struct ContactNode<T = f64> {
     pub(crate) velocity: Vec3<T>,
 }
 
-/// What friction needs of a node.
+/// A node of an element whose contact has friction: its rotation, and its state before.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeTurning<T = f64> {
     /// Its rotation, with the tensor T of the unknown

@@ -27,8 +27,6 @@ const PROPOSED_ERROR: f64 = 0.4;
 const LEAST_PART_OF_STEP: f64 = 0.1;
 /// The part of an imbalance from which on one reason explains most of it.
 const OWN_PART: f64 = 0.5;
-/// Penetrations between points with forces that are told, over those at such points, or over the allowed one.
-const MOST_HIDDEN: f64 = 2.0;
 /// Steps that a contact should last: with ten the rebound is within 0.4 %.
 const LEAST_STEPS_OF_CONTACT: u32 = 9;
 
@@ -90,7 +88,7 @@ impl Dynamics<'_, '_> {
         let stage = self.stage.number + 1;
         let deepest = self.stage.state.contacts.deepest;
         let between = self.stage.state.contacts.deepest_between;
-        if between > MOST_HIDDEN * deepest.max(1.0) {
+        if between > 0.0 {
             let message = format!(
                 "stage {stage}: beams penetrate each other by up to {} times `penetration`, between the points that carry \
                  forces: use more elements there",

@@ -38,7 +38,7 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
         self.stage
     }
 
-    /// Finds the modes with the lowest frequencies, and all unstable ones.
+    /// Finds the modes with the smallest |s|, and all unstable ones.
     fn run(&mut self) -> Result<(), Failure> {
         self.stage.tell_progress(0.0)?;
         let moving = self.stage.state.clone();
@@ -199,18 +199,16 @@ impl Modal<'_, '_> {
     }
 }
 
-/// The first modes by frequency, of those that are slowest or unstable, and all other unstable ones
-/// behind them.
+/// The modes with the smallest |s| and all further unstable ones, by frequency.
 fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
     let rigid = SmallMotion { exponent: Complex::default(), uncertainty: 0.0, shape: None };
     let mut all: Vec<SmallMotion> =
         found.motions.iter().cloned().chain(std::iter::repeat_n(rigid, found.rigid)).collect();
     sort_by(&mut all, |a, b| a.exponent.norm().total_cmp(&b.exponent.norm()));
-    let is_listed = |(number, motion): &(usize, SmallMotion)| *number < modes || grows(motion);
-    let mut listed: Vec<SmallMotion> =
-        all.into_iter().enumerate().filter(is_listed).map(|(_, motion)| motion).collect();
-    sort(&mut listed);
-    listed
+    let further = all.split_off(modes.min(all.len()));
+    all.extend(further.into_iter().filter(grows));
+    sort(&mut all);
+    all
 }
 
 fn mode(motion: &SmallMotion) -> Mode {

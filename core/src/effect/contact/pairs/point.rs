@@ -173,7 +173,7 @@ impl<'a> PairsNow<'a> {
                 found.extend(candidates.into_iter().map(|candidate| Found { number, candidate }));
             }
         }
-        self.share_among_near(&mut found);
+        self.share_among_near(&mut found, reach);
         found
     }
 
@@ -252,7 +252,8 @@ impl<'a> PairsNow<'a> {
     pub fn gap(&self, pair: &ListedPair) -> f64 {
         let strands = self.pairs.both(pair.meeting as usize);
         let bound = self.pairs.chord_gap(pair, &self.places);
-        if strands.iter().all(|strand| strand.order == 1) {
+        // Ends that do not touch are no candidates.
+        if strands.iter().all(|strand| strand.order == 1 && strand.has_caps) {
             return bound;
         }
         let candidates = self.candidates(pair, Kinds::ALL);

@@ -12,6 +12,9 @@ use crate::system::{Assembler, ListedPair, PairPointKind, PairPointMemory, Point
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
+/// Penetrations between points with forces that are told, over those at such points, or over the allowed one.
+const MOST_HIDDEN: f64 = 2.0;
+
 /// Pairs of beams with the laws of their contacts.
 #[derive(Clone, Copy)]
 pub(in crate::effect::contact) struct PairRole<'a> {
@@ -236,7 +239,7 @@ impl<'a> PairRole<'a> {
             // through material.
             let apart = [&before, &after].map(|places| self.pairs.chord_distance(pair, places));
             let least = apart[0].min(apart[1]).min(touching) - 0.5 * touching;
-            least > 0.0 && self.pairs.least_part(pair, &before, &after, [least, f64::INFINITY]) < 1.0
+            least > 0.0 && self.pairs.least_part(pair, &before, &after, [least, touching]) < 1.0
         };
         list.iter().filter(|pair| self.acts(pair, to)).find(passes).map(|pair| self.slot_of(pair))
     }
@@ -283,10 +286,10 @@ impl<'a> PairRole<'a> {
             }
         });
         let ended = known.iter().zip(&stays).filter(|(_, stays)| !**stays).map(|(point, _)| point.point.steps);
-        let hidden = self.deepest_over_allowed(at);
+        let between = Some(self.deepest_over_allowed(at)).filter(|between| *between > MOST_HIDDEN * deepest.max(1.0));
         let contacts = &mut at.contacts;
         contacts.deepest = contacts.deepest.max(deepest);
-        contacts.deepest_between = contacts.deepest_between.max(hidden);
+        contacts.deepest_between = contacts.deepest_between.max(between.unwrap_or_default());
         contacts.shortest = contacts.shortest.into_iter().chain(ended.filter(|&steps| steps > 0)).min();
     }
 

@@ -29,8 +29,8 @@ const SMALLEST_OFFSET: f64 = 0.05;
 /// The offset from which on closest points carry all of the force.
 const LARGEST_OFFSET: f64 = 0.15;
 
-/// The same in dynamic stages, whose penalties share the force: gaps between nodes and of nodes differ by 1.1 % of the
-/// sum of radii where closest points carry all of it. Only the angle across the normal counts, since beams that come
+/// Offsets from which closest points begin to carry force in dynamic stages, and carry all of it: gaps between nodes
+/// and of nodes differ by 1.1 % of the sum of radii there. Only the angle across the normal counts, since beams that come
 /// down on each other at an angle touch at nodes.
 const OFFSETS_OF_PENALTY: [f64; 2] = [0.1, 0.3];
 
@@ -90,44 +90,59 @@ impl PairsNow<'_> {
     }
 
     /// Where two kinks cross, up to four pairs of elements have closest points, and the nodes one more. Penalties of
-    /// those that are near each other act as one: together they have no more than the force of one.
-    pub(super) fn share_among_near(&self, found: &mut [Found]) {
+    /// those that are near each other act as one: together they have no more than the force of one. Each counts
+    /// by its depth below `reach`, the largest gap with a force, so that it comes without a jump.
+    pub(super) fn share_among_near(&self, found: &mut [Found], reach: f64) {
         if self.at.contacts.regime == ContactRegime::Augmented {
             return;
         }
-        let closest = |found: &Found| found.candidate.kind == PairPointKind::Closest;
-        let numbers: Vec<usize> = (0..found.len()).filter(|&i| closest(&found[i])).collect();
-        if numbers.len() < 2 {
+        let closest: Vec<NearPoint> =
+            found.iter().enumerate().filter_map(|(k, it)| self.near_point(k, it, reach)).collect();
+        if closest.len() < 2 {
             return;
         }
-        let places: Vec<[Vec3; 2]> = numbers.iter().map(|&i| self.places_of(&found[i])).collect();
-        let mut sums = vec![0.0; numbers.len()];
-        for (i, &own) in numbers.iter().enumerate() {
-            sums[i] += found[own].candidate.weight;
-            let pair = self.list[found[own].number];
-            let strands = self.pairs.both(pair.meeting as usize);
-            let radii = strands[0].radius + strands[1].radius;
-            let along = |number: usize| f64::from(self.list[found[number].number].elements[0]);
-            for (j, &other) in numbers.iter().enumerate().skip(i + 1) {
-                // They are in the order of the first beam, which may be a ring.
-                if strands[0].shift(along(own), along(other)) > 1.0 {
-                    if strands[0].is_closed() {
-                        continue;
-                    }
-                    break;
-                }
-                let apart = (0..2).map(|side| (places[i][side] - places[j][side]).norm()).fold(0.0, f64::max);
-                let near = 1.0 - smooth_part(apart, ONE_CONTACT.map(|part| part * radii));
-                sums[i] += near * found[other].candidate.weight;
-                sums[j] += near * found[own].candidate.weight;
+        let pair = self.list[found[closest[0].number].number];
+        let [first, second] = self.pairs.both(pair.meeting as usize);
+        let radii = first.radius + second.radius;
+        let mut sums: Vec<f64> = closest.iter().map(|point| point.weight).collect();
+        let mut add = |i: usize, j: usize| {
+            let [a, b] = [&closest[i], &closest[j]];
+            let apart = (0..2).map(|side| (a.places[side] - b.places[side]).norm()).fold(0.0, f64::max);
+            let near = 1.0 - smooth_part(apart, ONE_CONTACT.map(|part| part * radii));
+            sums[i] += near * b.weight * (b.depth / a.depth).min(1.0);
+            sums[j] += near * a.weight * (a.depth / b.depth).min(1.0);
+        };
+        for (i, own) in closest.iter().enumerate() {
+            // They are in the order of the first beam.
+            let length = first.element_length(own.element);
+            let last = own.element + 1 + (ONE_CONTACT[1] * radii / length) as usize;
+            let behind = closest.iter().enumerate().skip(i + 1);
+            behind.take_while(|(_, other)| other.element <= last).for_each(|(j, _)| add(i, j));
+        }
+        // A ring goes on at its start.
+        let end = first.elements() - 1;
+        if first.is_closed() && end > 1 {
+            for (i, _) in closest.iter().enumerate().filter(|(_, point)| point.element == 0) {
+                closest.iter().enumerate().filter(|(_, point)| point.element == end).for_each(|(j, _)| add(i, j));
             }
         }
-        for (&number, sum) in numbers.iter().zip(sums) {
-            let Found { number: pair, candidate } = &mut found[number];
+        for (point, sum) in closest.iter().zip(sums) {
+            let Found { number, candidate } = &mut found[point.number];
             // Nodes have the rest.
-            let whole = self.share_by_angle(&self.list[*pair], candidate);
+            let whole = self.share_by_angle(&self.list[*number], candidate);
             candidate.weight /= f64::max(sum / whole, 1.0);
         }
+    }
+
+    /// A closest point with a force, by its number among those found; `None` for others.
+    fn near_point(&self, number: usize, found: &Found, reach: f64) -> Option<NearPoint> {
+        let places = self.places_of(found);
+        let pair = &self.list[found.number];
+        let [first, second] = self.pairs.both(pair.meeting as usize);
+        let depth = reach + first.radius + second.radius - (places[0] - places[1]).norm();
+        let weight = found.candidate.weight;
+        let acts = found.candidate.kind == PairPointKind::Closest && depth > 0.0;
+        acts.then_some(NearPoint { number, element: pair.elements[0] as usize, places, depth, weight })
     }
 
     /// The places of a candidate on both centre lines.
@@ -176,8 +191,8 @@ impl PairsNow<'_> {
         }
     }
 
-    /// The sine of the angle between both beams across the normal of a candidate in the last accepted state, so
-    /// that it does not change within a step. `directions`: of both beams there.
+    /// The sine of the angle between both beams across the normal of a candidate in the last accepted state: within a
+    /// step only the place of the candidate changes it. `directions`: of both beams there.
     fn sine_across(&self, elements: [ElementOf; 2], candidate: &PairCandidate, directions: [Vec3; 2]) -> f64 {
         let [a, b] = directions.map(|direction| direction.normalized().unwrap_or(Vec3::ZERO));
         let both = a.cross(b);
@@ -189,7 +204,8 @@ impl PairsNow<'_> {
         let normal = match candidate.free {
             [true, true] => both,
             [true, false] => across(a),
-            [false, true] | [false, false] => across(b),
+            [false, true] => across(b),
+            [false, false] => apart,
         };
         normal.normalized().map_or(0.0, |normal| both.dot(normal).abs())
     }
@@ -303,6 +319,19 @@ impl PairsNow<'_> {
     pub(super) fn place_and_slope(&self, of: ElementOf, s: f64) -> [Vec3; 2] {
         place_and_slope(self.pairs.of_element(of, &self.places), s)
     }
+}
+
+/// A closest point with a force.
+struct NearPoint {
+    /// Its number among the candidates
+    number: usize,
+    /// Its element of the first beam
+    element: usize,
+    /// Its places on both centre lines
+    places: [Vec3; 2],
+    /// How far it is below the largest gap with a force
+    depth: f64,
+    weight: f64,
 }
 
 /// Where two elements of a beam meet.
