@@ -34,7 +34,7 @@ pub mod tube;
 pub mod variation;
 
 #[cfg(test)]
-pub(in crate::kernel) mod dual;
+pub(crate) mod dual;
 #[cfg(test)]
 mod pair_tests;
 #[cfg(test)]
