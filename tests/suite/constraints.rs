@@ -57,7 +57,7 @@ fn count(assembly: &mut Assembly, model: &Model, state: &State) -> (Option<usize
 #[test]
 fn negative_pivots_are_negative_eigenvalues_between_constraints() {
     let mut random = Random::new(17);
-    let (mut judged, mut unstable) = (0, 0);
+    let (mut judged, mut unstable, mut unknown) = (0, 0, 0);
     for kind in ["rigid", "revolute", "universal", "prismatic", "cylindrical"] {
         for unit in [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6] {
             for _ in 0..4 {
@@ -76,14 +76,16 @@ fn negative_pivots_are_negative_eigenvalues_between_constraints() {
                 let (told, negative, nearest) = count(&mut assembly, &model, &state);
                 // Nearer to zero round-off decides.
                 if nearest > 1e-10 {
-                    assert_eq!(told, Some(negative), "{deck}");
+                    // Where digits are lost nothing is told, which is right, and rare.
+                    assert!(told.is_none_or(|told| told == negative), "{told:?}, not {negative}\n{deck}");
+                    unknown += usize::from(told.is_none());
                     judged += 1;
                     unstable += usize::from(negative > 0);
                 }
             }
         }
     }
-    assert!(judged > 80 && unstable > 40, "{judged} judged, {unstable} unstable");
+    assert!(judged > 80 && unstable > 40 && unknown < 2, "{judged} judged, {unstable} unstable, {unknown} unknown");
 }
 
 /// A clamped bar, a second and a third one on joints of a kind, skew in space; the last hangs on its joint alone, or is tied to ground.
