@@ -78,7 +78,7 @@ impl<'a> ChainNow<'a> {
         let nodes: [ContactNode; N] = std::array::from_fn(|i| self.node(&nodes[i]));
         let place = (0..N).fold(Vec3::ZERO, |sum, i| sum + nodes[i].place * shape.values[i]);
         let distance = candidate.distance(&self.surface.surface, self.carrier.on_surface(place))?;
-        Some(add_point(&nodes, turning.as_ref(), &shape, &self.carrier, &distance, law, weights, out))
+        Some(add_point((&nodes, turning.as_ref()), &shape, &self.carrier, &distance, law, weights, out))
     }
 
     /// The points with a force, for memory. Points that an augmentation finds open keep the traction of

@@ -576,7 +576,7 @@ impl Contacts for SurfaceContacts {
             let touched = before.contacts.has_points(number);
             chain.each_point(Weights::NONE, &mut |point, _| {
                 let was_apart = || !touched && chain.gap_in(point.candidate, before) > chain.laws.penetration;
-                let friction = PointFriction::of(point.law.friction.as_ref(), &point.state, point.candidate.weight);
+                let friction = PointFriction::of(point.law.friction.as_ref(), point.state, point.candidate.weight);
                 late.add(chain.chain.contact, friction, was_apart);
             });
         });

@@ -175,8 +175,7 @@ struct Seen<T> {
 /// x_N, P_N and, for a carrier with unknowns, c, P_s. `distance` is that of the surface at
 /// [`Carrier::on_surface`] of the point. Only friction needs how nodes are turned.
 pub fn add_point<const N: usize, T: Real>(
-    nodes: &[ContactNode<T>; N],
-    turning: Option<&[NodeTurning<T>; N]>,
+    (nodes, turning): (&[ContactNode<T>; N], Option<&[NodeTurning<T>; N]>),
     shape: &ShapeAt<N, T>,
     carrier: &Carrier<T>,
     distance: &Distance<T>,

@@ -168,7 +168,7 @@ impl<const N: usize> Scene<N> {
         let distance = self.surface.distance(point).unwrap();
         let mut out = ElementSystem::new(self.blocks());
         let turning = self.turning(unknowns);
-        let state = add_point(&nodes, Some(&turning), &shape, &carrier, &distance, &self.law, weights, &mut out);
+        let state = add_point((&nodes, Some(&turning)), &shape, &carrier, &distance, &self.law, weights, &mut out);
         (out, state)
     }
 
