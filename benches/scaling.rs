@@ -148,40 +148,44 @@ fn row(elements: usize, dynamic: bool, interpolation: &str) {
     );
 }
 
-/// Grounds on which a beam lies with all its nodes, a little inside.
-const GROUNDS: [&str; 3] = ["plane", "cylinder", "beam"];
+/// The ground on which a beam lies with all its nodes, a little inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Ground {
+    Plane,
+    Cylinder,
+    Beam,
+}
 
 /// The section and the beam `b` along a path, held at its start.
-fn held_beam(path: &str, start: &str, elements: usize) -> String {
+fn held_beam(path: &str, elements: usize) -> String {
     format!(
         "[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\n[[beam]]\nname = \"b\"\nsection = \"s\"\n{path}\n\
-         elements = {elements}\n[[support]]\nat = {start}\nfix = \"all\"\n[[stage]]\nkind = \"static\"\nsteps = 1\n"
+         elements = {elements}\n[[support]]\nat = \"b@start\"\nfix = \"all\"\n[[stage]]\nkind = \"static\"\nsteps = 1\n"
     )
 }
 
-/// A beam that lies on something, and the contact of both.
-fn deck_in_contact(elements: usize, on: &str, friction: f64) -> [String; 2] {
-    let straight = held_beam("through = [[0, 0, 0], [10, 0, 0]]", "[0, 0, 0]", elements);
+/// A beam that lies on a ground, and the contact of both.
+fn deck_in_contact(elements: usize, on: Ground, friction: f64) -> [String; 2] {
+    let straight = held_beam("through = [[0, 0, 0], [10, 0, 0]]", elements);
     let (scene, parties) = match on {
-        "plane" => (
+        Ground::Plane => (
             format!(
                 "{straight}[[surface]]\nname = \"f\"\nkind = \"plane\"\npoint = [0, 0, -0.0099999]\nnormal = [0, 0, 1]\n"
             ),
             "beams = [\"b\"]\nsurfaces = [\"f\"]",
         ),
-        "cylinder" => (
-            held_beam("arc = [[-5, 0, 0], [0, 0, 5], [5, 0, 0]]", "[-5, 0, 0]", elements)
+        Ground::Cylinder => (
+            held_beam("arc = [[-5, 0, 0], [0, 0, 5], [5, 0, 0]]", elements)
                 + "[[surface]]\nname = \"f\"\nkind = \"cylinder\"\nfrom = [0, -1, 0]\nto = [0, 1, 0]\nradius = 4.9900001\n",
             "beams = [\"b\"]\nsurfaces = [\"f\"]",
         ),
-        "beam" => (
+        Ground::Beam => (
             format!(
                 "{straight}[[beam]]\nname = \"under\"\nsection = \"s\"\nthrough = [[0, 0, -0.0199999], [10, 0, -0.0199999]]\n\
                  elements = {elements}\n"
             ),
             "beams = [\"b\"]\nwith = [\"under\"]",
         ),
-        other => panic!("nothing is called {other}"),
     };
     [scene, format!("[[contact]]\nname = \"c\"\n{parties}\nradius = 0.01\nfriction = {friction}\n")]
 }
@@ -205,12 +209,12 @@ fn evaluation_seconds(deck: &str) -> [f64; 2] {
 }
 
 /// Prints nanoseconds a point of contact takes in an evaluation.
-fn contact_row(elements: usize, on: &str, friction: f64) {
+fn contact_row(elements: usize, on: Ground, friction: f64) {
     let [scene, contact] = deck_in_contact(elements, on, friction);
     let [without, with] = [scene.clone(), scene + &contact].map(|deck| evaluation_seconds(&deck));
     // Both beams have nodes that touch.
-    let points = if on == "beam" { 2 * elements } else { elements };
-    print!("{on:<9} {friction:>8} {points:>9}");
+    let points = if on == Ground::Beam { 2 * elements } else { elements };
+    print!("{:<9} {friction:>8} {points:>9}", format!("{on:?}").to_lowercase());
     for (with, without) in with.into_iter().zip(without) {
         print!(" {:>9.0}", 1e9 * (with - without) / points as f64);
     }
@@ -223,7 +227,7 @@ fn list_row(elements: usize) {
     let helix =
         format!("helix = {{ start = [1, 0, 0], centre = [0, 0, 0], axis = [0, 0, 1], turns = {turns}, pitch = 0.11 }}");
     let contact = "[[contact]]\nname = \"c\"\nbeams = [\"b\"]\nself = true\nradius = 0.05\n";
-    let deck = held_beam(&helix, "[1, 0, 0]", elements) + contact;
+    let deck = held_beam(&helix, elements) + contact;
     let (scene, _) = scene::from_text(&deck).unwrap_or_else(|_| panic!("the deck is good"));
     let model = scene.plan.model;
     let Some(contacts) = model.contacts() else { panic!("the coil touches itself") };
@@ -272,7 +276,9 @@ fn main() {
     let in_contact = largest.min(1_000);
     println!("\npoints in contact, nanoseconds per point");
     println!("{:<9} {:>8} {:>9} {:>9} {:>9}", "on", "friction", "points", "tangent", "force");
-    for (on, friction) in GROUNDS.into_iter().flat_map(|on| [(on, 0.0), (on, 0.3)]) {
+    for (on, friction) in
+        [Ground::Plane, Ground::Cylinder, Ground::Beam].into_iter().flat_map(|on| [(on, 0.0), (on, 0.3)])
+    {
         contact_row(in_contact, on, friction);
     }
     println!("\nlists of near elements of a coil, milliseconds");
