@@ -13,8 +13,8 @@ use super::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
 use super::strand::{ChainNode, Strand};
 use super::surface::SceneSurface;
 use crate::kernel::MAX_NODES;
-use crate::kernel::contact::along::{intervals_of_convex, place_on, weighted_sum};
-use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, minima};
+use crate::kernel::contact::along::{intervals_of_convex, minima_on, place_and_slope, place_on};
+use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface};
 use crate::system::{ChainMemory, Clearance, ContactRegime, PointMemory, State};
 use crate::tensor::Vec3;
 use std::ops::Deref;
@@ -334,25 +334,8 @@ impl SeenChain<'_> {
 
     /// The closest points of element `k` to the whole surface.
     fn minima(&self, k: usize) -> Minima {
-        fn of<const N: usize>(surface: &Surface, nodes: [Vec3; N]) -> Minima {
-            minima(&nodes, surface.intervals(&nodes), &|y| surface.distance(y).ok())
-        }
-        match *self.places_of(k) {
-            [a, b] => of(self.surface, [a, b]),
-            [a, b, c] => of(self.surface, [a, b, c]),
-            [a, b, c, d] => of(self.surface, [a, b, c, d]),
-            _ => Minima::default(),
-        }
-    }
-
-    /// The closest points of element `k` to an edge with this distance.
-    fn minima_to_edge(&self, k: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> Minima {
-        match *self.places_of(k) {
-            [a, b] => minima(&[a, b], intervals_of_convex(2), distance),
-            [a, b, c] => minima(&[a, b, c], intervals_of_convex(3), distance),
-            [a, b, c, d] => minima(&[a, b, c, d], intervals_of_convex(4), distance),
-            _ => Minima::default(),
-        }
+        let nodes = self.places_of(k);
+        minima_on(nodes, self.surface.intervals(nodes), &|y| self.surface.distance(y).ok())
     }
 
     /// The place of a point of element `k`.
@@ -362,12 +345,8 @@ impl SeenChain<'_> {
 
     /// The derivative of the place on element `k` over s.
     fn tangent(&self, k: usize, s: f64) -> Vec3 {
-        match self.places_of(k) {
-            [a, b] => weighted_sum(&ShapeAt::<2>::new(s).slopes, |i| [*a, *b][i]),
-            [a, b, c] => weighted_sum(&ShapeAt::<3>::new(s).slopes, |i| [*a, *b, *c][i]),
-            [a, b, c, d, ..] => weighted_sum(&ShapeAt::<4>::new(s).slopes, |i| [*a, *b, *c, *d][i]),
-            [_] | [] => Vec3::ZERO,
-        }
+        let [_, slope] = place_and_slope(self.places_of(k), s);
+        slope
     }
 
     /// The part of a force that the closest point of element `k` carries. At the inside of a kink, the
@@ -461,7 +440,8 @@ impl SeenChain<'_> {
             };
             let at = |s: f64, place: Place, weight: f64| Candidate { element: k, s, place, edge: Some(number), weight };
             let distance = |y: Vec3| edge.distance(y).ok();
-            let minima = self.minima_to_edge(k, &distance);
+            let nodes = self.places_of(k);
+            let minima = minima_on(nodes, intervals_of_convex(nodes.len()), &distance);
             let smooth = minima.found().iter().filter(|minimum| minimum.kind != MinimumKind::Kink);
             let beside = smooth.filter(|minimum| is_beside(minimum.s));
             found.extend(beside.map(|minimum| at(minimum.s, Place::Closest, self.weight(k, &distance))));

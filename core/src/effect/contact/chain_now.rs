@@ -5,6 +5,7 @@ use super::laws::ContactLaws;
 use super::predecessors::Predecessors;
 use super::strand::ChainNode;
 use super::surface::{SceneSurface, SurfaceCarrier};
+use crate::kernel::contact::along::place_on;
 use crate::kernel::contact::{Carrier, ContactLaw, ContactNode, NodeBefore, NodeTurning, PointState, add_point};
 use crate::kernel::{ElementSystem, Weights};
 use crate::system::{ChainMemory, ContactRegime, PointMemory, Slot, State};
@@ -205,13 +206,7 @@ impl<'a> ChainNow<'a> {
     fn place_in(&self, candidate: &Candidate, at: &State) -> Vec3 {
         let nodes = self.chain.nodes_of(candidate.element);
         let places: Vec<Vec3> = nodes.iter().map(|node| node.place + at.q[node.node.u as usize]).collect();
-        match &places[..] {
-            [a] => *a,
-            [a, b] => sum(&shape::<2>(candidate).values, &[*a, *b]),
-            [a, b, c] => sum(&shape::<3>(candidate).values, &[*a, *b, *c]),
-            [a, b, c, d, ..] => sum(&shape::<4>(candidate).values, &[*a, *b, *c, *d]),
-            [] => Vec3::ZERO,
-        }
+        place_on(&places, candidate.s)
     }
 
     /// The factor on the stiffness of stick that a point needs.
@@ -228,10 +223,6 @@ impl<'a> ChainNow<'a> {
         let nearest = (candidate.s * self.chain.order as f64).round() as usize;
         nodes[nearest.min(nodes.len() - 1)].node.u
     }
-}
-
-fn sum<const N: usize>(factors: &[f64; N], places: &[Vec3; N]) -> Vec3 {
-    factors.iter().zip(places).fold(Vec3::ZERO, |sum, (factor, place)| sum + *place * *factor)
 }
 
 impl PointNow<'_> {

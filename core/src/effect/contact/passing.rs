@@ -23,10 +23,9 @@ pub(super) fn passed(chain: &Chain, surface: &SceneSurface, from: &State, to: &S
     let node = before.iter().zip(&after).position(|(before, after)| way.passes(*before, *after));
     node.or_else(|| {
         let order = chain.order;
-        let elements = 0..if order == 0 { 0 } else { chain.elements() };
         let nodes = |k: usize| k * order..=(k + 1) * order;
-        let passes = |&k: &usize| way.element_passes(&before[nodes(k)], &after[nodes(k)]);
-        Some(elements.into_iter().find(passes)? * order)
+        let passes = |&k: &usize| order > 0 && way.element_passes(&before[nodes(k)], &after[nodes(k)]);
+        Some((0..chain.elements()).find(passes)? * order)
     })
 }
 
@@ -77,8 +76,8 @@ impl Way<'_> {
         }
         let parts = (before.len() - 1) as f64;
         let places = (length / parts / (self.radius + self.depth)).ceil().clamp(2.0, MOST_PLACES) * parts;
-        let between = (1..places as usize).map(|k| k as f64 / places);
-        between.into_iter().any(|at| self.passes(place_on(before, at), place_on(after, at)))
+        let mut between = (1..places as usize).map(|k| k as f64 / places);
+        between.any(|at| self.passes(place_on(before, at), place_on(after, at)))
     }
 }
 

@@ -158,15 +158,23 @@ impl Bend {
     }
 }
 
-/// The place at s of an element of two to four nodes, or of a single node.
-pub fn place_on(nodes: &[Vec3], s: f64) -> Vec3 {
-    match *nodes {
-        [] => Vec3::ZERO,
-        [a] => a,
-        [a, b] => weighted_sum(&ShapeAt::<2>::new(s).values, |i| [a, b][i]),
-        [a, b, c] => weighted_sum(&ShapeAt::<3>::new(s).values, |i| [a, b, c][i]),
-        [a, b, c, d, ..] => weighted_sum(&ShapeAt::<4>::new(s).values, |i| [a, b, c, d][i]),
+/// The place at s of an element of one to four nodes, and its derivative.
+pub fn place_and_slope(nodes: &[Vec3], s: f64) -> [Vec3; 2] {
+    fn sums<const N: usize>(nodes: &[Vec3], s: f64) -> [Vec3; 2] {
+        let shape = ShapeAt::<N>::new(s);
+        [shape.values, shape.slopes].map(|factors| weighted_sum(&factors, |i| nodes[i]))
     }
+    match nodes.len() {
+        0 | 1 => sums::<1>(nodes, s),
+        2 => sums::<2>(nodes, s),
+        3 => sums::<3>(nodes, s),
+        _ => sums::<4>(nodes, s),
+    }
+}
+
+/// The place at s of an element of one to four nodes.
+pub fn place_on(nodes: &[Vec3], s: f64) -> Vec3 {
+    place_and_slope(nodes, s)[0]
 }
 
 /// F_s and F_ss of the distance along an element.
@@ -201,6 +209,16 @@ pub fn minima<const N: usize>(
         }
     });
     out
+}
+
+/// [`minima`] of an element of two to four nodes; a single node has none.
+pub fn minima_on(nodes: &[Vec3], intervals: usize, distance: &dyn Fn(Vec3) -> Option<Distance>) -> Minima {
+    match *nodes {
+        [a, b] => minima(&[a, b], intervals, distance),
+        [a, b, c] => minima(&[a, b, c], intervals, distance),
+        [a, b, c, d] => minima(&[a, b, c, d], intervals, distance),
+        _ => Minima::default(),
+    }
 }
 
 #[cfg(test)]

@@ -115,16 +115,16 @@ impl Surface {
     /// Parts of an element, each of which has one local minimum of the distance at most. Along a straight
     /// element the distance from a convex body is a convex function outside, and a concave one inside. Elsewhere it
     /// rises and falls on ways as long as the radius, of which there are more in elements of four radii.
-    pub fn intervals<const N: usize>(&self, nodes: &[Vec3; N]) -> usize {
-        let at_least = 2 * N.saturating_sub(1);
+    pub fn intervals(&self, nodes: &[Vec3]) -> usize {
+        let at_least = 2 * nodes.len().saturating_sub(1);
         let is_convex = match &self.shape {
             Shape::Plane { .. } | Shape::Sphere { .. } | Shape::Cylinder { .. } | Shape::Cone(_) => true,
             Shape::Torus { .. } | Shape::Tube(_) => false,
             // Edges have minima of their own.
             Shape::Box { .. } | Shape::Mesh(_) => return at_least,
         };
-        if is_convex && N == 2 {
-            return intervals_of_convex(N);
+        if is_convex && nodes.len() == 2 {
+            return intervals_of_convex(2);
         }
         let chords: f64 = nodes.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
         let needed = INTERVALS_OF_RADIUS * chords / self.shape.depth();

@@ -170,33 +170,33 @@ impl<'a> PairRole<'a> {
         });
     }
 
+    /// Shows the listed pairs that act and penetrate, with their depth, a length, and the one that is allowed.
+    fn each_penetration(self, at: &State, show: &mut dyn FnMut(&ListedPair, f64, f64)) {
+        let now = self.now(at);
+        for pair in now.list.iter().filter(|pair| self.acts(pair, at)) {
+            if self.pairs.chord_gap(pair, &now.places) < 0.0 {
+                show(pair, -now.gap(pair), self.law_of(pair.meeting).penetration);
+            }
+        }
+    }
+
     /// The deepest penetration among listed pairs that act, if it is larger than `allowed` times that of
     /// the deck; `begins`: see [`Contacts::penetrates`](crate::effect::Contacts::penetrates).
     fn deepest(self, at: &State, allowed: f64, begins: &dyn Fn(usize) -> bool) -> Option<(ListedPair, f64)> {
-        let now = self.now(at);
         let mut deepest: Option<(ListedPair, f64)> = None;
-        let looks = |pair: &&ListedPair| self.acts(pair, at) && begins(self.law_of(pair.meeting).amplitude);
-        for pair in now.list.iter().filter(looks) {
-            let depth = -now.gap(pair);
+        self.each_penetration(at, &mut |pair, depth, of_deck| {
             let is_deepest = deepest.is_none_or(|(_, deepest)| depth > deepest);
-            if depth > allowed * self.law_of(pair.meeting).penetration && is_deepest {
+            if depth > allowed * of_deck && is_deepest && begins(self.law_of(pair.meeting).amplitude) {
                 deepest = Some((*pair, depth));
             }
-        }
+        });
         deepest
     }
 
     /// The deepest penetration of beams anywhere, over the one that is allowed; zero without one.
     fn deepest_over_allowed(self, at: &State) -> f64 {
-        let now = self.now(at);
         let mut deepest = 0.0f64;
-        for pair in now.list.iter().filter(|pair| self.acts(pair, at)) {
-            let allowed = self.law_of(pair.meeting).penetration;
-            let may_be_deepest = -self.pairs.chord_gap(pair, &now.places) > deepest * allowed;
-            if may_be_deepest {
-                deepest = deepest.max(-now.gap(pair) / allowed);
-            }
-        }
+        self.each_penetration(at, &mut |_, depth, allowed| deepest = deepest.max(depth / allowed));
         deepest
     }
 

@@ -9,8 +9,7 @@
 use super::candidate::{AT_NODE, Kinds, PairCandidate};
 use super::point::{Found, PairsNow};
 use super::{BeamPairs, ElementOf};
-use crate::kernel::contact::ShapeAt;
-use crate::kernel::contact::along::weighted_sum;
+use crate::kernel::contact::along::place_and_slope;
 use crate::system::{ContactRegime, ListedPair, PairPointKind};
 use crate::tensor::Vec3;
 use std::f64::consts::FRAC_PI_2;
@@ -101,8 +100,18 @@ impl PairsNow<'_> {
         if closest.len() < 2 {
             return;
         }
-        let pair = self.list[found[closest[0].number].number];
-        let [first, second] = self.pairs.both(pair.meeting as usize);
+        for (point, sum) in closest.iter().zip(self.sums_near(&closest)) {
+            let Found { number, candidate } = &mut found[point.number];
+            // Nodes have the rest.
+            let whole = self.share_by_angle(&self.list[*number], candidate);
+            candidate.weight /= f64::max(sum / whole, 1.0);
+        }
+    }
+
+    /// For each of the closest points of a meeting, its weight and those near it, which are in the order of the first
+    /// beam.
+    fn sums_near(&self, closest: &[NearPoint]) -> Vec<f64> {
+        let [first, second] = self.pairs.both(closest[0].pair.meeting as usize);
         let radii = first.radius + second.radius;
         let mut sums: Vec<f64> = closest.iter().map(|point| point.weight).collect();
         let mut add = |i: usize, j: usize| {
@@ -112,43 +121,32 @@ impl PairsNow<'_> {
             sums[i] += near * b.weight * (b.depth / a.depth).min(1.0);
             sums[j] += near * a.weight * (a.depth / b.depth).min(1.0);
         };
+        let on_element = |element: usize| (0..closest.len()).filter(move |&k| closest[k].element() == element);
         for (i, own) in closest.iter().enumerate() {
-            // They are in the order of the first beam.
-            let length = first.element_length(own.element);
-            let last = own.element + 1 + (ONE_CONTACT[1] * radii / length) as usize;
-            let behind = closest.iter().enumerate().skip(i + 1);
-            behind.take_while(|(_, other)| other.element <= last).for_each(|(j, _)| add(i, j));
+            let length = first.element_length(own.element());
+            let last = own.element() + 1 + (ONE_CONTACT[1] * radii / length) as usize;
+            (i + 1..closest.len()).take_while(|&j| closest[j].element() <= last).for_each(|j| add(i, j));
         }
         // A ring goes on at its start.
         let end = first.elements() - 1;
         if first.is_closed() && end > 1 {
-            for (i, _) in closest.iter().enumerate().filter(|(_, point)| point.element == 0) {
-                closest.iter().enumerate().filter(|(_, point)| point.element == end).for_each(|(j, _)| add(i, j));
-            }
+            on_element(0).for_each(|i| on_element(end).for_each(|j| add(i, j)));
         }
-        for (point, sum) in closest.iter().zip(sums) {
-            let Found { number, candidate } = &mut found[point.number];
-            // Nodes have the rest.
-            let whole = self.share_by_angle(&self.list[*number], candidate);
-            candidate.weight /= f64::max(sum / whole, 1.0);
-        }
+        sums
     }
 
     /// A closest point with a force, by its number among those found; `None` for others.
     fn near_point(&self, number: usize, found: &Found, reach: f64) -> Option<NearPoint> {
-        let places = self.places_of(found);
-        let pair = &self.list[found.number];
+        let Found { number: of_pair, candidate } = found;
+        if candidate.kind != PairPointKind::Closest {
+            return None;
+        }
+        let pair = self.list[*of_pair];
+        let elements = self.pairs.elements_of(&pair);
+        let places = [0, 1].map(|side| self.place_and_slope(elements[side], candidate.at[side])[0]);
         let [first, second] = self.pairs.both(pair.meeting as usize);
         let depth = reach + first.radius + second.radius - (places[0] - places[1]).norm();
-        let weight = found.candidate.weight;
-        let acts = found.candidate.kind == PairPointKind::Closest && depth > 0.0;
-        acts.then_some(NearPoint { number, element: pair.elements[0] as usize, places, depth, weight })
-    }
-
-    /// The places of a candidate on both centre lines.
-    fn places_of(&self, Found { number, candidate }: &Found) -> [Vec3; 2] {
-        let elements = self.pairs.elements_of(&self.list[*number]);
-        [0, 1].map(|side| self.place_and_slope(elements[side], candidate.at[side])[0])
+        (depth > 0.0).then_some(NearPoint { number, pair, places, depth, weight: candidate.weight })
     }
 
     /// The kinds of points that a pair may have, by the angles between its elements.
@@ -325,13 +323,19 @@ impl PairsNow<'_> {
 struct NearPoint {
     /// Its number among the candidates
     number: usize,
-    /// Its element of the first beam
-    element: usize,
+    pair: ListedPair,
     /// Its places on both centre lines
     places: [Vec3; 2],
     /// How far it is below the largest gap with a force
     depth: f64,
     weight: f64,
+}
+
+impl NearPoint {
+    /// Its element of the first beam.
+    fn element(&self) -> usize {
+        self.pair.elements[0] as usize
+    }
 }
 
 /// Where two elements of a beam meet.
@@ -351,19 +355,6 @@ impl Kink {
     /// Towards the inside of the kink.
     fn turn(&self) -> Vec3 {
         self.beyond - self.own
-    }
-}
-
-/// The place on an element with these nodes at a point, and its derivative.
-fn place_and_slope(nodes: &[Vec3], s: f64) -> [Vec3; 2] {
-    fn sums<const N: usize>(nodes: &[Vec3], s: f64) -> [Vec3; 2] {
-        let shape = ShapeAt::<N>::new(s);
-        [shape.values, shape.slopes].map(|factors| weighted_sum(&factors, |i| nodes[i]))
-    }
-    match nodes.len() {
-        2 => sums::<2>(nodes, s),
-        3 => sums::<3>(nodes, s),
-        _ => sums::<4>(nodes, s),
     }
 }
 
