@@ -2,9 +2,14 @@
 //!
 //! Each element is a ball around its middle. Cells are as wide as the largest reach of two balls,
 //! so that partners are in the same cell or in one of the 26 around it. Sorting keys with numbers of
-//! elements makes the pairs, and their order, a function of the places alone.
+//! elements makes the pairs, and their order, a function of the places alone. Cells that follow each
+//! other in z have keys that do: the 27 cells are nine ranges of sorted keys.
 
 use crate::tensor::Vec3;
+use std::ops::Range;
+
+/// Columns of cells in a cube of three cells a side.
+const COLUMNS: usize = 9;
 
 /// Cells in each direction on both sides of the origin: 21 bits of a key for each direction.
 const LIMIT: i64 = 1 << 20;
@@ -27,32 +32,33 @@ pub fn overlapping(balls: &[Ball], show: &mut dyn FnMut(usize, usize)) {
     if !width_is_usable {
         return;
     }
+    let is_finite = |ball: &Ball| ball.middle.is_finite() && ball.reach.is_finite();
     let mut keys: Vec<(u64, u32)> = vec![];
-    for (number, ball) in balls.iter().enumerate() {
-        if ball.middle.is_finite() && ball.reach.is_finite() {
-            keys.push((key(cell(ball.middle, width)), number as u32));
-        }
+    for (number, ball) in balls.iter().enumerate().filter(|(_, ball)| is_finite(ball)) {
+        keys.push((key(cell(ball.middle, width)), number as u32));
     }
     keys.sort_unstable();
+    let in_cells: Vec<Ball> = keys.iter().map(|&(_, number)| balls[number as usize]).collect();
     let mut partners = vec![];
-    for (number, ball) in balls.iter().enumerate() {
-        if !(ball.middle.is_finite() && ball.reach.is_finite()) {
-            continue;
-        }
+    // Elements that follow each other are often in one cell.
+    let mut around: Option<([i64; 3], [Range<usize>; COLUMNS])> = None;
+    for (number, ball) in balls.iter().enumerate().filter(|(_, ball)| is_finite(ball)) {
+        let at = cell(ball.middle, width);
+        let (_, ranges) = match around.take() {
+            Some(known) if known.0 == at => around.insert(known),
+            Some(_) | None => around.insert((at, ranges_around(at, &keys))),
+        };
         partners.clear();
-        for_each_cell_around(cell(ball.middle, width), &mut |cell| {
-            let wanted = key(cell);
-            let first = keys.partition_point(|&(key, _)| key < wanted);
-            let here = keys[first..].iter().take_while(|&&(key, _)| key == wanted);
-            partners.extend(here.map(|&(_, other)| other as usize).filter(|&other| other > number));
-        });
-        partners.retain(|&other| {
-            let reach = ball.reach + balls[other].reach;
-            (balls[other].middle - ball.middle).squared() <= reach * reach
-        });
+        for range in ranges {
+            let in_range = in_cells[range.clone()].iter().zip(&keys[range.clone()]);
+            for (other, &(_, partner)) in in_range.filter(|(_, (_, partner))| *partner as usize > number) {
+                let reach = ball.reach + other.reach;
+                if (other.middle - ball.middle).squared() <= reach * reach {
+                    partners.push(partner as usize);
+                }
+            }
+        }
         partners.sort_unstable();
-        // Cells at the limit of the grid share keys.
-        partners.dedup();
         partners.iter().for_each(|&other| show(number, other));
     }
 }
@@ -66,14 +72,15 @@ fn key(cell: [i64; 3]) -> u64 {
     cell.iter().fold(0, |key, &index| (key << 21) | (index + LIMIT) as u64)
 }
 
-fn for_each_cell_around([x, y, z]: [i64; 3], show: &mut dyn FnMut([i64; 3])) {
-    for dx in -1..=1 {
-        for dy in -1..=1 {
-            for dz in -1..=1 {
-                show([x + dx, y + dy, z + dz]);
-            }
-        }
-    }
+/// The ranges of sorted keys in a cell and in those around it, one for each column in z.
+fn ranges_around([x, y, z]: [i64; 3], keys: &[(u64, u32)]) -> [Range<usize>; COLUMNS] {
+    std::array::from_fn(|column| {
+        let [dx, dy] = [column / 3, column % 3].map(|index| index as i64 - 1);
+        let [least, most] = [z - 1, z + 1].map(|z| key([x + dx, y + dy, z]));
+        let first = keys.partition_point(|&(key, _)| key < least);
+        let count = keys[first..].partition_point(|&(key, _)| key <= most);
+        first..first + count
+    })
 }
 
 #[cfg(test)]
