@@ -1,11 +1,15 @@
 //! Requests to stop concern the whole process, so that they are tested in one of their own.
 
+use beamsim_core::effect::{Effect, Energy, Roles, TangentForm};
 use beamsim_core::interrupt;
+use beamsim_core::kernel::Weights;
 use beamsim_core::model::{Model, ModelBuilder, SectionMatrices, StraightBeam};
 use beamsim_core::run::{Counters, Failure, Observer, Plan, Run, Snapshot, Stage, StageResult, StageWork};
+use beamsim_core::system::{Assembler, Category, Connectivity, Memory, MirrorData, Slot, State};
 use beamsim_core::tensor::Vec3;
 use beamsim_core::threads;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -13,6 +17,11 @@ const SIGTERM: i32 = 15;
 
 /// A column of many elements, with a force along it below its critical load.
 fn column(elements: usize) -> Model {
+    builder_of_column(elements).0.build().unwrap()
+}
+
+/// The builder of a column, and the displacement of its tip.
+fn builder_of_column(elements: usize) -> (ModelBuilder, Slot) {
     let mut builder = ModelBuilder::new();
     let root = builder.node("root", Vec3([0.0, 0.0, 0.0]));
     let tip = builder.node("tip", Vec3([1.0, 0.0, 0.0]));
@@ -22,7 +31,66 @@ fn column(elements: usize) -> Model {
         .unwrap();
     builder.clamp(root).unwrap();
     builder.force(tip, Vec3([-20.0, 0.0, 0.0])).unwrap();
-    builder.build().unwrap()
+    let slot = builder.slots(tip).unwrap().u;
+    (builder, slot)
+}
+
+/// No force at one node, which counts evaluations and asks to stop at one of them.
+struct Alarm {
+    slot: Slot,
+    /// The number of evaluations so far
+    count: Arc<AtomicUsize>,
+    /// The number of the evaluation at which it asks to stop
+    at: Option<usize>,
+}
+
+impl Effect for Alarm {
+    fn name(&self) -> &'static str {
+        "alarm"
+    }
+
+    fn category(&self) -> Category {
+        Category::Internal
+    }
+
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
+        connectivity.push([self.slot]);
+        connectivity
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
+    }
+
+    fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {}
+
+    fn add(&self, _at: &State, _memory: &Memory, _weights: Weights, _out: &mut Assembler) {
+        let number = self.count.fetch_add(1, Ordering::Relaxed);
+        if self.at == Some(number) {
+            interrupt::request(SIGTERM);
+        }
+    }
+
+    fn energy(&self, _at: &State) -> Energy {
+        Energy { kinetic: 0.0, strain: 0.0 }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
+    }
+}
+
+/// A column that asks to stop at an evaluation, and the number of evaluations so far.
+fn column_with_alarm(at: Option<usize>) -> (Model, Arc<AtomicUsize>) {
+    let count = Arc::new(AtomicUsize::new(0));
+    let (mut builder, slot) = builder_of_column(4);
+    builder.effect(Alarm { slot, count: count.clone(), at });
+    (builder.build().unwrap(), count)
 }
 
 /// Collects all that a run tells.
@@ -72,10 +140,14 @@ fn a_request_ends_work_without_a_verdict() {
     let of_statics = Plan::new(column(100), vec![Stage::new(statics)]);
     let works = [statics, StageWork::Path { steps: 20, max_steps: 30 }, StageWork::Buckling { modes: 3 }];
 
-    // From a row on.
-    let (result, _, recorder) = run(&of_statics, Some(3));
-    assert!(matches!(result, Err(Failure::Interrupted { signal: SIGTERM, .. })), "{result:?}");
-    assert_eq!(recorder.rows.len(), 3);
+    // From a row on: the first one comes before the search for the direction of a path.
+    for (work, row) in works.into_iter().take(2).flat_map(|work| [1, 3].map(|row| (work, row))) {
+        interrupt::withdraw();
+        let plan = Plan::new(column(100), vec![Stage::new(work)]);
+        let (result, _, recorder) = run(&plan, Some(row));
+        assert!(matches!(result, Err(Failure::Interrupted { signal: SIGTERM, .. })), "{work:?}: {result:?}");
+        assert_eq!(recorder.rows.len(), row, "{work:?}");
+    }
     interrupt::request(2);
     assert_eq!(interrupt::requested(), Some(SIGTERM), "the first request stays");
 
@@ -85,6 +157,21 @@ fn a_request_ends_work_without_a_verdict() {
     assert!(recorder.rows.is_empty() && counters.work.iterations == 0);
     assert_eq!(threads::unless_interrupted(|| 7), None);
     interrupt::withdraw();
+
+    // At any evaluation.
+    for work in works {
+        let (model, count) = column_with_alarm(None);
+        let plan = Plan::new(model, vec![Stage::new(work)]);
+        assert_eq!(run(&plan, None).0, Ok(()));
+        for number in 0..count.load(Ordering::Relaxed) {
+            let plan = Plan::new(column_with_alarm(Some(number)).0, vec![Stage::new(work)]);
+            let (result, _, recorder) = run(&plan, None);
+            interrupt::withdraw();
+            let is_interrupted = matches!(result, Err(Failure::Interrupted { signal: SIGTERM, .. }));
+            assert!(is_interrupted || result == Ok(()), "{work:?}, evaluation {number}: {result:?}");
+            assert!(!is_interrupted || recorder.results == 0, "{work:?}, evaluation {number}");
+        }
+    }
 
     // While a call is under way that nothing else ends.
     let begun = Instant::now();

@@ -96,9 +96,13 @@ fn shown(status: ExitStatus) -> i32 {
     status.code().unwrap_or_else(|| 128 + status.signal().unwrap_or(0))
 }
 
-/// Starts a process again and again until a signal, sent after `delay`, is answered in time.
+/// Starts a process again and again until a signal, sent after `delay`, is answered in time. Each begins without the
+/// checkpoint that the one before has left.
 fn answers(folder: &Folder, arguments: &[&str], delay: Duration, signal: i32) {
     for attempt in 1..=ATTEMPTS {
+        if let Some(option) = arguments.iter().position(|&argument| argument == "--out") {
+            let _ = fs::remove_dir_all(folder.0.join(arguments[option + 1]));
+        }
         let mut running = Running::start(&folder.0, arguments);
         sleep(delay);
         running.send(signal);
@@ -136,7 +140,6 @@ fn every_stage_of_any_size_answers_signals_at_any_instant() {
             folder.write(&deck, &(ARM.replace("ELEMENTS", &elements.to_string()) + stage));
             for (delay, signal) in cases.by_ref().take(3) {
                 let out = format!("results/{name}");
-                let _ = fs::remove_dir_all(folder.0.join(&out));
                 answers(&folder, &["run", &deck, "--out", &out], delay, signal);
                 let left = if folder.0.join(&out).is_dir() { folder.names(&out) } else { Vec::new() };
                 let is_part = |name: &String| name.ends_with(".part");
