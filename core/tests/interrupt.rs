@@ -158,7 +158,7 @@ fn a_request_ends_work_without_a_verdict() {
     assert_eq!(threads::unless_interrupted(|| 7), None);
     interrupt::withdraw();
 
-    // At any evaluation.
+    // At any evaluation: what was left half-done is taken for no verdict ("nothing grows with the load").
     for work in works {
         let (model, count) = column_with_alarm(None);
         let plan = Plan::new(model, vec![Stage::new(work)]);

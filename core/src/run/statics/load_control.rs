@@ -74,8 +74,6 @@ impl StageRun<'_> {
     /// stays factorised.
     pub fn path_direction(&mut self) -> Result<Option<PathDirection>, Failure> {
         let pull = self.load_derivative();
-        // After a request to stop, forces are incomplete: their difference may vanish.
-        self.unless_interrupted()?;
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
         if pull.iter().chain(prescribed_increment.iter()).all(|&v| v == Vec3::ZERO) {
             return Ok(None);
@@ -93,7 +91,6 @@ impl StageRun<'_> {
         }
         let mut rate = vec![Vec3::ZERO; pull.len()];
         system.pattern.dof_map.scatter(&solution, Some(prescribed_increment), &mut rate);
-        self.unless_interrupted()?;
         Ok(Some(PathDirection { rate, pull }))
     }
 
