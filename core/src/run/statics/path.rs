@@ -1,8 +1,8 @@
 //! Arc-length control: paths of equilibrium that turn back in load or in displacement.
 //!
 //! Along a path the state q and the load factor are both unknown; a step goes a given length ds
-//! along the tangent t of the last point and then back to the path in the plane normal to it (Riks
-//! 1979, doi:10.1016/0020-7683(79)90081-7):
+//! along the tangent t of the last point, and aside as the path has bent up to there, and then back
+//! to the path in the plane normal to t (Riks 1979, doi:10.1016/0020-7683(79)90081-7):
 //!
 //! ```text
 //! <t_u, u - u_n>/U^2 + t_l (l - l_n) = ds,     K dq = -g - g_l dl
@@ -12,7 +12,7 @@
 //! the load factor; rotation vectors follow through the equations, so that no chart enters.
 
 use super::load_control::PathDirection;
-use super::path_point::{Path, PathPoint};
+use super::path_point::{Bend, Path, PathPoint};
 use super::stability::LARGEST_CONTRACTION;
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
@@ -24,6 +24,9 @@ use crate::tensor::Vec3;
 
 /// Iterations of a step after which the next one stays as long
 const EASY: f64 = 5.0;
+/// The contraction of corrections after which the next step stays as long. It grows with the size of
+/// the first correction, which goes with the third power of the length where the bend is followed.
+const STEADY_CONTRACTION: f64 = 0.5 * LARGEST_CONTRACTION;
 /// The longest step, over the first one.
 const LONGEST: f64 = 2.0;
 /// The longest step where the path is straight and brings little load, over [`LONGEST`].
@@ -35,6 +38,13 @@ const SHORTEST: f64 = 1.0 / 16384.0;
 /// The cosine between tangents, or between a tangent and its chord, below which a step was too
 /// long: it may have come down on another branch.
 const MIN_COSINE: f64 = 0.8;
+/// The longest step that follows the bend of the path, over the one that the bend was taken from.
+const LONGEST_OF_BEND: f64 = 4.0;
+/// The shortest step that a bend is taken from, over the one of the bend before it: tangents that lie
+/// nearer, at a located point, have no digits of it.
+const SHORTEST_OF_BEND: f64 = 1e-3;
+/// The largest angle, in radians, by which a step follows the bend of the path.
+const LARGEST_BEND: f64 = 0.6;
 /// Part of the first step below which a change of pivots that no limit point explains is believed, and
 /// corrections may grow.
 const BELIEVED: f64 = 1.0 / 1024.0;
@@ -126,6 +136,7 @@ impl Path {
             work_rate: 1.0,
             signature: None,
             on_limit: false,
+            bend: None,
         };
         Self {
             begun: stage.state.load,
@@ -167,7 +178,29 @@ impl Path {
             work_rate: work * load_rate,
             signature,
             on_limit: false,
+            bend: None,
         })
+    }
+
+    /// The point at the run's state, `length` ahead of here, with the bend of the path. Rates of rotation vectors in different
+    /// charts have no difference that tells one.
+    fn arrive(&mut self, stage: &mut StageRun, length: f64, charts_changed: bool) -> Result<PathPoint, Failure> {
+        let mut next = self.look(stage, &self.here.clone())?;
+        next.bend = match &self.here.bend {
+            _ if charts_changed => None,
+            Some(bend) if length < SHORTEST_OF_BEND * bend.over => Some(bend.clone()),
+            Some(_) | None => Some(self.bend_to(stage, &next, length)),
+        };
+        Ok(next)
+    }
+
+    /// How the path bends between here and a point `length` ahead, across the tangent there.
+    fn bend_to(&self, stage: &StageRun, next: &PathPoint, length: f64) -> Bend {
+        let mut rate: Vec<Vec3> = next.tangent.iter().zip(&self.here.tangent).map(|(t, here)| *t - *here).collect();
+        let load_rate = next.load_rate - self.here.load_rate;
+        let along = dot(stage, &next.tangent, &rate) * self.scale + next.load_rate * load_rate;
+        rate.iter_mut().zip(&next.tangent).for_each(|(r, t)| *r = (*r - *t * along) * (1.0 / length));
+        Bend { rate, load_rate: (load_rate - next.load_rate * along) / length, over: length }
     }
 
     /// One step that is neither too hard nor too bent; its length.
@@ -175,8 +208,8 @@ impl Path {
         loop {
             let length = self.length;
             let failure = match self.advance(stage, length) {
-                Ok(Corrected { iterations, contraction }) => {
-                    let next = match self.look(stage, &self.here.clone()) {
+                Ok(Corrected { iterations, contraction, charts_changed }) => {
+                    let next = match self.arrive(stage, length, charts_changed) {
                         Ok(next) => next,
                         Err(failure) => {
                             stage.state.copy_from(&self.here.state);
@@ -189,7 +222,9 @@ impl Path {
                     let has_strayed = contraction > LARGEST_CONTRACTION || self.may_have_jumped(&next);
                     let fine = straight && !(has_strayed && length > BELIEVED * self.first);
                     if fine || length <= SHORTEST * self.first {
-                        let factor = (EASY / iterations.max(1) as f64).sqrt().clamp(0.5, 2.0);
+                        let by_iterations = (EASY / iterations.max(1) as f64).sqrt();
+                        let by_contraction = (STEADY_CONTRACTION / contraction).cbrt();
+                        let factor = by_iterations.min(by_contraction).clamp(0.5, 2.0);
                         let is_easy = iterations <= 2 && cosine >= STRAIGHT;
                         let longest = if is_easy { self.longest(next.load_rate) } else { LONGEST * self.first };
                         self.length = (length * factor).min(longest.max(length));
@@ -248,7 +283,7 @@ impl Path {
         stage.assembly.forget();
         let round_off = stage.assembly.round_off(stage.state);
         let mut last: Option<f64> = None;
-        let mut done = Corrected { iterations: 0, contraction: 0.0 };
+        let mut done = Corrected { iterations: 0, contraction: 0.0, charts_changed: false };
         let mut history = Vec::new();
         loop {
             NewtonFailure::unless_interrupted()?;
@@ -287,20 +322,33 @@ impl Path {
             let size = solve::size(stage.model, &dq);
             done.contraction = done.contraction.max(solve::contraction(last, size));
             let switched = correct(stage, &dq);
+            done.charts_changed |= switched;
             // What was a correction before is none in a new chart.
             last = Some(if switched { f64::INFINITY } else { size });
             done.iterations += 1;
         }
     }
 
-    /// The state `length` along the tangent; its load factor.
+    /// The state `length` along the tangent, aside by the bend of the path; its load factor.
     fn predict(&self, stage: &mut StageRun, length: f64) -> f64 {
         let here = &self.here;
         stage.state.copy_from(&here.state);
-        let ahead: Vec<Vec3> = here.tangent.iter().map(|t| *t * length).collect();
+        let mut ahead: Vec<Vec3> = here.tangent.iter().map(|t| *t * length).collect();
+        let mut load = here.state.load + here.load_rate * length;
+        if let Some(bend) = here.bend.as_ref().filter(|bend| self.may_follow(stage, bend, length)) {
+            let aside = 0.5 * length * length;
+            ahead.iter_mut().zip(&bend.rate).for_each(|(d, b)| *d += *b * aside);
+            load += bend.load_rate * aside;
+        }
         charts::carry(stage.state, &ahead, &stage.charted.rotations);
         stage.state.q.iter_mut().zip(&ahead).for_each(|(q, d)| *q += *d);
-        here.state.load + here.load_rate * length
+        load
+    }
+
+    /// True if a step may follow this bend over a length.
+    fn may_follow(&self, stage: &StageRun, bend: &Bend, length: f64) -> bool {
+        let size = (squared(stage, &bend.rate) * self.scale + bend.load_rate.powi(2)).sqrt();
+        length <= LONGEST_OF_BEND * bend.over && length * size <= LARGEST_BEND
     }
 
     /// The correction of Newton within the plane normal to the tangent: of the unknowns, and of the
@@ -372,8 +420,8 @@ impl Path {
         for _ in 0..MOST_LOOKS {
             let share = if high.value == low.value { 0.5 } else { -low.value / (high.value - low.value) };
             let at = low.at + (high.at - low.at) * share.clamp(0.02, 0.98);
-            self.advance(stage, at).ok()?;
-            let point = self.look(stage, &self.here.clone()).ok()?;
+            let Corrected { charts_changed, .. } = self.advance(stage, at).ok()?;
+            let point = self.arrive(stage, at, charts_changed).ok()?;
             let value = target.value(&point);
             found = (point, at);
             if value.abs() <= LOCATED * size || (high.at - low.at).abs() <= LOCATED * length {
@@ -395,6 +443,8 @@ struct Corrected {
     iterations: usize,
     /// The largest correction over the one before it: on the way back to the path corrections shrink
     contraction: f64,
+    /// Nodes have changed their charts.
+    charts_changed: bool,
 }
 
 /// A length along the tangent, and the value that is looked for there.

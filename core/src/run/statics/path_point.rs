@@ -17,6 +17,18 @@ pub struct PathPoint {
     pub(super) signature: Option<Signature>,
     /// It is a limit point: one pivot is next to zero, with the sign of round-off
     pub(super) on_limit: bool,
+    /// How the path bends there, where that is known
+    pub(super) bend: Option<Bend>,
+}
+
+/// The change of the unit tangent over the length along the path, without its part in the tangent.
+#[derive(Clone, Deserialize, Serialize)]
+pub struct Bend {
+    pub(super) rate: Vec<Vec3>,
+    /// The part in the load factor
+    pub(super) load_rate: f64,
+    /// The length between the two tangents that it was taken from
+    pub(super) over: f64,
 }
 
 /// A path being followed.
