@@ -5,7 +5,7 @@ use super::geometry::Geometry;
 use super::grid::REFINEMENT;
 use super::material::Material;
 use super::mesh::Mesh;
-use super::properties::{Properties, load_about_origin, mass_centre, moved, moved_compliance, relative_difference};
+use super::properties::{Properties, energy_difference, load_about_origin, mass_centre, moved, moved_compliance};
 use super::saint_venant::{Solution, solve};
 use super::stress::NodalStresses;
 use super::{Matrix6, Point, Vector6};
@@ -82,7 +82,7 @@ pub struct Analysis {
     pub mesh: Mesh,
     /// The solution on it
     pub solution: Solution,
-    /// Estimated error of the stiffness, relative to the root of the products of diagonals
+    /// Estimated relative error of the stiffness, in the energy of any strain
     pub estimate: f64,
     /// False if the aim was not met with the largest mesh
     pub meets_aim: bool,
@@ -124,7 +124,7 @@ impl StressField {
 pub enum MeshAim {
     /// The error [`DEFAULT_AIM`], without the largest meshes
     Usual,
-    /// Estimated error of the stiffness, relative to the root of the products of diagonals
+    /// Estimated relative error of the stiffness, in the energy of any strain
     Error(f64),
     /// Longest side of an element
     Size(f64),
@@ -166,8 +166,10 @@ impl Computed {
     /// The estimated error, from a coarser mesh.
     fn estimate(&self, coarser: &Self) -> f64 {
         let refinement = REFINEMENT.powi((self.level - coarser.level) as i32);
-        let difference = relative_difference(&coarser.solution.stiffness, &self.solution.stiffness);
-        difference / (libm::pow(refinement, ASSUMED_ORDER) - 1.0)
+        let [coarse, fine] = [coarser, self].map(|on| moved(&on.solution.stiffness, self.solution.centroid));
+        let difference = energy_difference(&coarse, &fine);
+        // Without digits nothing is known of it.
+        difference.unwrap_or(f64::INFINITY) / (libm::pow(refinement, ASSUMED_ORDER) - 1.0)
     }
 
     /// The most levels by which a finer mesh has no more than a number of nodes.

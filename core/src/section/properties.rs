@@ -120,6 +120,20 @@ pub fn relative_difference(matrix: &Matrix6, reference: &Matrix6) -> f64 {
     (0..36).map(|k| scaled(k / 6, k % 6)).fold(0.0, f64::max)
 }
 
+/// The largest difference of two stiffness matrices, relative to the second, in the energy of any strain. It does not
+/// depend on the point that strains belong to, but for round-off: it should lie in the section. `None` where the second is
+/// not positive definite.
+pub fn energy_difference(matrix: &Matrix6, reference: &Matrix6) -> Option<f64> {
+    let scale = Vector6::from_fn(|i, _| 1.0 / reference[(i, i)].sqrt());
+    let scaled = |of: &Matrix6| Matrix6::from_fn(|i, j| of[(i, j)] * scale[i] * scale[j]);
+    let factor = scaled(reference).cholesky()?;
+    let half = factor.l_dirty().solve_lower_triangular(&scaled(&(matrix - reference)))?;
+    let whole = factor.l_dirty().solve_lower_triangular(&half.transpose())?;
+    let symmetric = 0.5 * (whole + whole.transpose());
+    let values = symmetric.symmetric_eigenvalues();
+    values.iter().all(|value| value.is_finite()).then(|| values.amax())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,6 +148,18 @@ mod tests {
         }
         assert!((found.gj - 1.0).abs() < 1e-12 && (found.ea - 10.0).abs() < 1e-11);
         assert!(relative_difference(&moved(&about_corner, [0.3, -0.2]), &diagonal) < 1e-13);
+    }
+
+    #[test]
+    fn a_difference_of_energies_does_not_depend_on_the_point() {
+        let [fine, mut coarse] = [Matrix6::from_diagonal(&nalgebra::Vector6::new(1e3, 1e3, 1e3, 0.02, 50.0, 70.0)); 2];
+        coarse[(3, 3)] *= 1.5;
+        for at in [[0.0, 0.0], [0.0, 10.0], [-30.0, 4.0]] {
+            let [fine, coarse] = [&fine, &coarse].map(|matrix| moved(matrix, at));
+            let difference = energy_difference(&coarse, &fine).expect("a positive definite matrix");
+            assert!((difference - 0.5).abs() < 1e-6, "{at:?} {difference}");
+        }
+        assert_eq!(energy_difference(&coarse, &-fine), None);
     }
 
     #[test]
