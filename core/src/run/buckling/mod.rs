@@ -11,7 +11,7 @@ mod spectrum;
 mod walk;
 
 use self::search::{CriticalSearch, Sight};
-use self::spectrum::{critical_loads, negative_pivots, next_critical_load, rank, unpaired_critical_loads};
+use self::spectrum::{critical_loads, direction, negative_pivots, next_critical_load, rank, unpaired_critical_loads};
 use self::walk::{Walked, continue_path, has_leapt};
 use super::distance::distance;
 use super::failure::Failure;
@@ -52,6 +52,9 @@ const WELL_FORESEEN: f64 = 2e-3;
 /// Looks of one extrapolation.
 const MOST_EXTRAPOLATIONS: usize = 48;
 
+/// Where pivots cannot be counted: the largest difference, relative to a critical load that is known, between it and how it
+/// looks from another state.
+const LIKE_KNOWN: f64 = 2e-2;
 /// The rate of motion next to a critical load, times that load, in lengths of the scene and radians, below
 /// which what moves is round-off and no limit point. A ten-millionth before a limit point it is about
 /// 1600 times the whole motion to it.
@@ -118,9 +121,22 @@ fn is_near(a: f64, b: f64, part: f64) -> bool {
     (a - b).abs() <= part * b.abs()
 }
 
+/// Critical loads as they look from a state, without those that look like known ones: each known one takes the nearest away.
+fn without_known(mut seen: Vec<f64>, known: &[CriticalLoad]) -> Vec<f64> {
+    for CriticalLoad { load, .. } in known {
+        let off = |&at: &usize| (seen[at] - load).abs();
+        let nearest = (0..seen.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
+        if let Some(at) = nearest.filter(|&at| is_near(seen[at], *load, LIKE_KNOWN)) {
+            seen.remove(at);
+        }
+    }
+    seen
+}
+
 /// The critical loads above the present one so far, or those below it.
-#[derive(Clone, Copy, Default)]
+#[derive(Default)]
 struct SoFar {
+    found: Vec<CriticalLoad>,
     limit: PathLimit,
     /// The estimate of the last one from the start, if it was right
     foreseen: Option<f64>,
@@ -213,7 +229,6 @@ impl Buckling<'_, '_> {
     /// The critical loads on one side of the present one that look from the start like these, up to a limit point
     /// that ends the path.
     fn find_all(&mut self, loads: &[f64], start: &State) -> Result<Vec<CriticalLoad>, Failure> {
-        let mut found = Vec::new();
         let mut so_far = SoFar::default();
         for (number, &seen) in loads.iter().enumerate() {
             let next = self.find(loads, number, start, &so_far)?;
@@ -222,13 +237,13 @@ impl Buckling<'_, '_> {
                 break;
             }
             so_far.foreseen = is_near(seen, next.critical.load, WELL_FORESEEN).then_some(seen);
-            found.push(next.critical);
+            so_far.found.push(next.critical);
         }
-        Ok(found)
+        Ok(so_far.found)
     }
 
-    /// The critical load that looks from the start as number `number` of these. The state is then
-    /// the start again.
+    /// The critical load that looks from the start as number `number` of these, behind those that were found so
+    /// far. The state is then the start again.
     fn find(&mut self, loads: &[f64], number: usize, start: &State, so_far: &SoFar) -> Result<Found, Failure> {
         let aim = Aim { sight: Sight { from: start.load, critical: loads[number] }, before: number, nearest: loads[0] };
         if so_far.limit == PathLimit::Imperfect {
@@ -239,7 +254,7 @@ impl Buckling<'_, '_> {
         // The look from the start is as much work as a search.
         let count = loads.len() as f64;
         let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
-        let mut found = self.follow(loads[number], number, &done)?;
+        let mut found = self.follow(loads[number], number, &so_far.found, &done)?;
         self.stage.go_back_to(start)?;
         if found.critical.kind == CriticalKind::Estimate {
             found.critical.load = self.extrapolate(loads[number], number)?.unwrap_or(found.critical.load);
@@ -253,7 +268,13 @@ impl Buckling<'_, '_> {
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative.
     /// Every attempt starts from the last point before it, since behind it the way back is not sure
     /// to be the same. `done` tells the part of the stage that lies behind with some part of this.
-    fn follow(&mut self, estimate: f64, before: usize, done: &dyn Fn(f64) -> f64) -> Result<Found, Failure> {
+    fn follow(
+        &mut self,
+        estimate: f64,
+        before: usize,
+        known: &[CriticalLoad],
+        done: &dyn Fn(f64) -> f64,
+    ) -> Result<Found, Failure> {
         let at_start = self.response()?;
         let none = negative_pivots(self.stage);
         let mut search = CriticalSearch::new(self.stage.state.clone(), estimate);
@@ -289,7 +310,7 @@ impl Buckling<'_, '_> {
             let Some(passed) = none.zip(count).map(|(none, count)| count.saturating_sub(none)) else {
                 // Without a count of pivots the tangent itself must do.
                 self.stage.go_back_to(&search.here)?;
-                return self.follow_nearest(search.estimate, before, done);
+                return self.follow_nearest(search.estimate, before, known, done);
             };
             if passed > before {
                 search.close_at(target, self.stage.state.clone());
@@ -353,7 +374,7 @@ impl Buckling<'_, '_> {
 
     /// How a unit of load moves the scene at the present state.
     fn response(&mut self) -> Result<Response, Failure> {
-        let Some(direction) = self.stage.path_direction()? else { return Ok(Response { size: 0.0, work: None }) };
+        let Some(direction) = direction(self.stage)? else { return Ok(Response { size: 0.0, work: None }) };
         let model = &self.stage.model;
         let sizes = direction.rate.iter().zip(model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
         let size = sizes.map(|(rate, kind)| rate.norm() / kind.scale(model.length)).fold(0.0, f64::max);
@@ -392,18 +413,20 @@ impl Buckling<'_, '_> {
         Ok(steadiest)
     }
 
-    /// Goes from estimate to estimate, each what the critical load looks like from the last.
+    /// Goes from estimate to estimate, each what the critical load looks like from the last. Those that look like a known
+    /// one are that one, as often as it is known.
     fn follow_nearest(
         &mut self,
         mut critical: f64,
         before: usize,
+        known: &[CriticalLoad],
         done: &dyn Fn(f64) -> f64,
     ) -> Result<Found, Failure> {
         let mut walked = Walked::There;
         for _ in 0..MOST_LOOKS {
             self.stage.tell_progress(done(0.0))?;
             let from = self.stage.state.load;
-            let near = critical_loads(self.stage, before + 4)?;
+            let near = without_known(critical_loads(self.stage, before + 4)?, known);
             // Those that were passed lie behind: it is the one that looks most like the last
             // estimate.
             let off = |load: &f64| (load - critical).abs();
@@ -461,6 +484,15 @@ mod tests {
             loads.push(load);
         }
         loads
+    }
+
+    #[test]
+    fn each_known_load_takes_one_of_those_in_sight_away() {
+        let known = [7.0, 7.001].map(|load| CriticalLoad { load, kind: CriticalKind::Branch });
+        assert_eq!(without_known(vec![7.01, 9.0], &known[..1]), [9.0]);
+        assert_eq!(without_known(vec![7.0, 7.0, 9.0], &known[..1]), [7.0, 9.0]);
+        assert_eq!(without_known(vec![7.0, 6.99, 9.0], &known), [9.0]);
+        assert_eq!(without_known(vec![7.3, 9.0], &known), [7.3, 9.0]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Critical loads as they look from a state: the eigenvalues of its tangent and of how that varies
 //! along the path.
 
+use crate::effect::ContactChange;
 use crate::kernel::Weights;
 use crate::model::SlotKind;
 use crate::run::failure::Failure;
@@ -15,6 +16,8 @@ use nalgebra::Complex;
 /// How far the state is moved along the path to see the tangent vary: lengths of the scene, and
 /// radians.
 const PROBE: f64 = 1e-5;
+/// The ways along the path that are tried where contacts may open on them, over the usual one.
+const REACHES_IN_CONTACT: [f64; 6] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5];
 /// Imaginary part up to which the distance of a critical load counts as real, relative to it; double ones come apart a
 /// little.
 const REAL: f64 = 1e-3;
@@ -32,10 +35,29 @@ const PAIRED: f64 = 0.05;
 /// The number of negative pivots of the tangent at the present state; `None` where it is not
 /// symmetric.
 pub fn negative_pivots(stage: &mut StageRun) -> Option<usize> {
-    let StageRun { assembly, newton, state, .. } = stage;
-    assembly.forget();
-    assembly.evaluate(state, Weights::STIFFNESS, None);
-    newton.solver.negative_pivots(&mut Tangent::that_may_go(assembly, state, Weights::STIFFNESS))
+    with_held_contacts(stage, |stage| {
+        let StageRun { assembly, newton, state, .. } = stage;
+        assembly.forget();
+        assembly.evaluate(state, Weights::STIFFNESS, None);
+        newton.solver.negative_pivots(&mut Tangent::that_may_go(assembly, state, Weights::STIFFNESS))
+    })
+}
+
+/// The direction of the path at the present state.
+pub fn direction(stage: &mut StageRun) -> Result<Option<PathDirection>, Failure> {
+    with_held_contacts(stage, |stage| stage.path_direction())
+}
+
+/// A look at the tangent of the present state with the points that touch held as they are: the stiffness of contacts that
+/// load levels begin with may be small beside that of the structure. Levels go on with the stiffness that they had.
+fn with_held_contacts<T>(stage: &mut StageRun, look: impl FnOnce(&mut StageRun) -> T) -> T {
+    let Some(contacts) = stage.model.contacts().filter(|_| stage.state.contacts.touches()) else { return look(stage) };
+    let memory = stage.state.contacts.clone();
+    contacts.hold(stage.state);
+    let seen = look(stage);
+    stage.state.contacts = memory;
+    stage.assembly.forget();
+    seen
 }
 
 /// The critical loads as they look from the present state: so many, those above it first.
@@ -77,11 +99,22 @@ fn nearest_critical_loads(
     first: First,
     is_enough: &dyn Fn(&[f64]) -> bool,
 ) -> Result<Vec<f64>, Failure> {
+    with_held_contacts(stage, |stage| nearest_of_tangent(stage, modes, first, is_enough))
+}
+
+/// As [`nearest_critical_loads`], of the tangent with the present stiffness of contacts.
+fn nearest_of_tangent(
+    stage: &mut StageRun,
+    modes: usize,
+    first: First,
+    is_enough: &dyn Fn(&[f64]) -> bool,
+) -> Result<Vec<f64>, Failure> {
     let Some(PathDirection { rate: direction, .. }) = stage.path_direction()? else { return Ok(Vec::new()) };
     let length = stage.model.length;
     let moving = direction.iter().zip(stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
     let size = moving.map(|(d, kind)| d.norm() * kind.arm(length) / length).fold(0.0, f64::max);
     let reach = if size > 0.0 { (PROBE / size).min(1e6) } else { 1.0 };
+    let reach = reach_in_contact(stage, &direction, reach);
     let varied = varied_tangent(stage, &direction, reach);
     let StageRun { assembly, newton, model, state, counters, .. } = stage;
     assembly.evaluate(state, Weights::STIFFNESS, None);
@@ -181,19 +214,35 @@ fn spins(kinds: &[SlotKind], dof_map: &DofMap, here: &State, there: &State) -> V
     (0..kinds.len()).filter(|&slot| has_turned(slot)).filter(is_free).map(of_slot).collect()
 }
 
+/// The state beside the present one, by a difference of the load factor, if the path were straight.
+fn beside(stage: &StageRun, direction: &[Vec3], by: f64) -> State {
+    let StageRun { model, state: here, schedule, .. } = stage;
+    let mut state = (*here).clone();
+    schedule.set_clock(model, &mut state, here.time, here.load + by);
+    state.q.copy_from_slice(&here.q);
+    state.q.iter_mut().zip(direction).for_each(|(q, &d)| *q += d * by);
+    state
+}
+
+/// The largest of a few reaches over which all points that touch stay in contact: where they open the tangent jumps. The
+/// first one, where they open over all of them.
+fn reach_in_contact(stage: &StageRun, direction: &[Vec3], reach: f64) -> f64 {
+    let Some(contacts) = stage.model.contacts().filter(|_| stage.state.contacts.touches()) else { return reach };
+    let is_kept = |by: f64| contacts.change(stage.state, &beside(stage, direction, by)) == ContactChange::None;
+    let mut shorter = REACHES_IN_CONTACT.into_iter().map(|part| part * reach);
+    shorter.find(|&reach| is_kept(reach) && is_kept(-reach)).unwrap_or(reach)
+}
+
 fn varied_tangent(stage: &mut StageRun, direction: &[Vec3], reach: f64) -> VariedTangent {
-    let StageRun { assembly, model, state: here, schedule, .. } = stage;
+    let ends = [reach, -reach].map(|by| beside(stage, direction, by));
+    let StageRun { assembly, model, state: here, .. } = stage;
     assembly.forget();
-    let mut tangent = |reach: f64| {
-        let mut state = (*here).clone();
-        schedule.set_clock(model, &mut state, here.time, here.load + reach);
-        state.q.copy_from_slice(&here.q);
-        state.q.iter_mut().zip(direction).for_each(|(q, &d)| *q += d * reach);
+    let tangent = |state: State| {
         assembly.evaluate(&state, Weights::STIFFNESS, None);
         let spins = spins(&model.kinds, &assembly.system.pattern.dof_map, here, &state);
         TangentAtEnd { values: assembly.system.values.clone(), spins }
     };
-    VariedTangent { ends: [tangent(reach), tangent(-reach)], width: 2.0 * reach }
+    VariedTangent { ends: ends.map(tangent), width: 2.0 * reach }
 }
 
 /// Loads above the present one come first, nearest first, then the others.
