@@ -66,8 +66,14 @@ const SMOOTH: &str = "`smooth = true` makes velocity and acceleration continuous
 const SAMPLED: &str = "an `expr`, or a table with more points, has no kinks (`smooth = true` has none either, but its \
                        velocity is zero at each of its times)";
 
+const FORMULA_BETWEEN_STEPS: &str = "a shorter `step`, or a table instead of the `expr`, with `adaptive = true`: adaptive steps \
+                                     end at the times of tables";
+
 const BETWEEN_STEPS: &str = "a shorter `step`, of which the times of the history are multiples, or `adaptive = true`, \
                              whose steps end at these times";
+
+const BETWEEN_LEVELS: &str = "more `steps`, so that levels end at the times of the history, which are load factors in a \
+                              static stage";
 
 struct Teller<'a> {
     deck: &'a Deck,
@@ -137,7 +143,17 @@ impl Teller<'_> {
                 );
                 Diagnostic::warning(WarningKind::MissedLoad, message, table.span.clone())
                     .context(begins_there, "this stage")
-                    .help(BETWEEN_STEPS)
+                    .help(self.help_between_steps(*history))
+            }
+            JumpKind::BetweenLevels { part } => {
+                let percent = (100.0 * part).round();
+                let message = format!(
+                    "the load levels of stage {number} miss a peak of the history{name} of this {what}: between two \
+                     levels it goes beyond both by {percent} % of its range{more}"
+                );
+                Diagnostic::warning(WarningKind::MissedLoad, message, table.span.clone())
+                    .context(begins_there, "this stage")
+                    .help(self.help_between_levels(*history))
             }
             JumpKind::Kink { time } => {
                 let message = format!(
@@ -149,13 +165,32 @@ impl Teller<'_> {
         }
     }
 
+    fn body_of(&self, history: Option<&str>) -> Option<&HistoryBody> {
+        let named = |table: &&HistoryTable| Some(table.name.value.as_str()) == history;
+        self.deck.histories.iter().find(named).map(|table| &table.body)
+    }
+
+    /// Advice on histories that change between time steps.
+    fn help_between_steps(&self, history: Option<&str>) -> &'static str {
+        match self.body_of(history) {
+            Some(HistoryBody::Expression(_)) => FORMULA_BETWEEN_STEPS,
+            Some(HistoryBody::Table { .. }) | None => BETWEEN_STEPS,
+        }
+    }
+
+    /// Advice on histories with a peak between load levels.
+    fn help_between_levels(&self, history: Option<&str>) -> &'static str {
+        match self.body_of(history) {
+            Some(HistoryBody::Expression(_)) => {
+                "more `steps`, so that levels lie on both sides of the peak and near it"
+            }
+            Some(HistoryBody::Table { .. }) | None => BETWEEN_LEVELS,
+        }
+    }
+
     /// Advice on histories with kinks.
     fn help_of_kinks(&self, history: Option<&str>) -> &'static str {
-        let named = |table: &&HistoryTable| Some(table.name.value.as_str()) == history;
-        let Some(HistoryBody::Table { values, .. }) = self.deck.histories.iter().find(named).map(|table| &table.body)
-        else {
-            return SMOOTH;
-        };
+        let Some(HistoryBody::Table { values, .. }) = self.body_of(history) else { return SMOOTH };
         let goes_on = |w: &[f64]| (w[1] - w[0]) * (w[2] - w[1]) > 0.0;
         if values.windows(3).any(goes_on) { SAMPLED } else { SMOOTH }
     }

@@ -278,6 +278,20 @@ fn an_accuracy_is_kept_where_motions_are_shorter_than_steps() {
     assert!((came.abs() - 0.51971).abs() <= 1e-3 * 0.7468, "{came} for 0.51971");
 }
 
+/// The same of a load by a formula: all steps that miss its pulse agree.
+#[test]
+fn an_accuracy_is_kept_where_pulses_are_shorter_than_steps() {
+    let folder = Folder::new("short_pulse");
+    let deck = format!("{}/decks/dynamics/formula_between_steps.toml", env!("CARGO_MANIFEST_DIR"));
+    let output = folder.beamsim(&["run", &deck, "--accuracy", "1e-2", "--out", "out"]);
+    assert_eq!(status(&output), 0, "{}", last_line(&output));
+    let history = HistoryReader::read(&folder.0.join("out/history.csv")).unwrap();
+    let column = history.names.iter().position(|name| name == "a.vx").unwrap();
+    let came = history.rows.last().unwrap()[column];
+    let impulse = 600.0 * 0.0004 * std::f64::consts::PI.sqrt();
+    assert!((came - impulse).abs() <= 1e-2 * impulse, "{came} for {impulse}");
+}
+
 /// The middle of an arc is a node of the deck's mesh, and of those that are chosen.
 #[test]
 fn an_accuracy_is_kept_at_nodes_that_other_meshes_do_not_have() {

@@ -163,6 +163,55 @@ fn warnings_about_a_deck_stand_in_its_record_without_a_moment() {
     assert_eq!(told["warnings"], record["warnings"]);
 }
 
+/// Two bodies under a pulse, given as a formula: over the time of the run, and over that of the second stage.
+#[test]
+fn pulses_between_steps_are_told_by_the_clock_of_their_stages() {
+    let body = |name: &str| format!("[[body]]\nat = \"{name}\"\nmass = 1\ninertia = [1, 1, 1]\n");
+    let scene = format!(
+        "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n{}{}[history.h]\nexpr = \"exp(-((t - 0.505)/0.002)^2)\"\n",
+        body("a"),
+        body("b")
+    );
+    let load = |at: &str, history: &str| format!("[[load]]\nat = \"{at}\"\nforce = [1, 0, 0]\nhistory = {history}\n");
+    let stages = |step: f64| {
+        [1.0, 2.0].map(|end| format!("[[stage]]\nkind = \"dynamic\"\nend = {end}\nstep = {step}\n")).concat()
+    };
+    let of_run = load("a", "\"h\"");
+    let of_stage = load("b", "{ name = \"h\", stages = [2] }");
+    let missed = |loads: &str, step: f64| -> Vec<String> {
+        let all = warnings(&format!("{scene}{loads}{}", stages(step)));
+        all.into_iter().filter(|message| message.contains("% of the history `h`")).collect()
+    };
+    let [first, second] = [&of_run, &of_stage].map(|loads| missed(loads, 0.01));
+    assert!(first.len() == 1 && first[0].contains("of stage 1"), "{first:?}");
+    assert!(second.len() == 1 && second[0].contains("of stage 2"), "{second:?}");
+    let both = missed(&(of_run.clone() + &of_stage), 0.01);
+    assert!(both.len() == 1 && both[0].contains("likewise another load"), "{both:?}");
+    assert!(missed(&(of_run + &of_stage), 0.001).is_empty());
+}
+
+/// Also a formula, and a motion.
+#[test]
+fn peaks_between_load_levels_are_told() {
+    let scene = |history: &str, steps: usize| {
+        let driven = "[[motion]]\nat = \"top\"\nuz = -0.01\nhistory = \"h\"\n";
+        let stage = format!("[[stage]]\nkind = \"static\"\nsteps = {steps}\n");
+        column(0.0, &format!("{driven}[history.h]\n{history}\n{stage}"))
+    };
+    let table = "times = [0, 0.25, 0.5, 1]\nvalues = [0, 1, 0, 0]";
+    for (history, steps, is_missed) in [
+        (table, 2, true),
+        (table, 4, false),
+        ("expr = \"sin(8*pi*t)\"", 4, true),
+        ("expr = \"sin(8*pi*t)\"", 64, false),
+        ("expr = \"t^3\"", 1, false),
+    ] {
+        let all = warnings(&scene(history, steps));
+        let told = all.iter().any(|message| message.contains("miss a peak of the history `h` of this motion"));
+        assert_eq!(told, is_missed, "{history}, {steps} levels: {all:?}");
+    }
+}
+
 #[test]
 fn expected_warnings_are_judged() {
     let folder = Folder::new("expected_warnings");

@@ -301,6 +301,23 @@ impl<'a> Timeline<'a> {
         self.dynamic_history()?.next_corner(&self.progress.clock, time)
     }
 
+    /// The first load factor behind `load` in a static stage at which its history is not smooth, or bends most.
+    pub fn next_corner_of_load(&self, load: f64) -> Option<f64> {
+        self.amplitude.history.as_ref()?.next_corner_of_load(load)
+    }
+
+    /// True if its history knows where it bends.
+    pub fn knows_corners(&self) -> bool {
+        self.amplitude.history.as_ref().is_some_and(Reading::knows_corners)
+    }
+
+    /// What those share that follow the same history in the present stage; `None` for what follows none, or does not move by it.
+    pub fn history_identity(&self) -> Option<(usize, u64)> {
+        let history =
+            self.amplitude.history.as_ref().filter(|_| self.follows_history() && self.amplitude.full != 0.0)?;
+        Some(history.identity(&self.progress.clock))
+    }
+
     /// The first time behind `time` at which its rate jumps.
     pub fn next_kink(&self, time: f64) -> Option<f64> {
         self.dynamic_history()?.next_kink(&self.progress.clock, time)

@@ -15,6 +15,11 @@ pub trait History: Send + Sync {
         self.at(x)[1]
     }
 
+    /// True if the function knows where it bends. Others are sampled.
+    fn knows_corners(&self) -> bool {
+        false
+    }
+
     /// The first abscissa after `x` where the function is not smooth, changes its formula, or bends most between such
     /// places; `None` if there is none.
     fn next_corner(&self, _x: f64) -> Option<f64> {
@@ -135,6 +140,22 @@ impl Reading {
         next_on_clock(clock, time, |x| self.function.next_corner(x))
     }
 
+    /// The first load factor after `load` in a static stage at which the function is not smooth, or bends most.
+    pub fn next_corner_of_load(&self, load: f64) -> Option<f64> {
+        self.function.next_corner(load)
+    }
+
+    /// True if the function knows where it bends.
+    pub fn knows_corners(&self) -> bool {
+        self.function.knows_corners()
+    }
+
+    /// What readings share that have the same values in a stage: the place of the function in memory, and the bits of the time
+    /// at which it begins.
+    pub fn identity(&self, clock: &HistoryClock) -> (usize, u64) {
+        (Arc::as_ptr(&self.function).cast::<()>() as usize, clock.origin().to_bits())
+    }
+
     /// The first time after `time` in a dynamic stage at which the first derivative jumps
     /// noticeably.
     pub fn next_kink(&self, clock: &HistoryClock, time: f64) -> Option<f64> {
@@ -178,6 +199,10 @@ pub struct Table {
 }
 
 impl History for Table {
+    fn knows_corners(&self) -> bool {
+        true
+    }
+
     fn at(&self, x: f64) -> [f64; 3] {
         let last = self.times.len() - 1;
         if x < self.times[0] {

@@ -36,7 +36,8 @@ impl Failure {
                 Some("take more `steps`, a larger `penetration`, or a larger `stiffness` of the contact".into())
             }
             Self::ContactStart { .. } => Some(
-                "move the surface or the beam apart (the radius of the contact counts), or allow a larger `penetration`"
+                "move the surface or the beam apart (the radius of the contact counts), or allow a larger `penetration`; \
+                 a surface that is to hold the beam within it takes `side = \"inside\"`"
                     .into(),
             ),
             Self::SliderEnd { .. } => Some(

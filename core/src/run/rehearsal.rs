@@ -5,7 +5,7 @@
 //! prescribed motions moves.
 
 use super::plan::{InitialMotion, Plan, Stage, StageWork, TimeStepping};
-use super::sampling::missed_part;
+use super::sampling::{missed_part, missed_part_of_samples, missed_peak, sampled_load_factors};
 use crate::model::{Model, Motion, MotionKind, NOTICED, Schedule, StageError, StageKind, Timeline};
 use crate::system::{DofMap, Slot, State};
 use crate::tensor::Vec3;
@@ -80,6 +80,11 @@ pub enum JumpKind {
     /// Between the ends of fixed time steps, which do not see all of it
     BetweenSteps {
         /// The share that they miss of the impulse of a load, or of the way of a motion
+        part: f64,
+    },
+    /// Between load levels, which do not see its peak
+    BetweenLevels {
+        /// How far it goes beyond its values at the levels around it, over its range
         part: f64,
     },
     /// It has no finite value, velocity or acceleration where the stage begins.
@@ -183,6 +188,9 @@ impl<'p> Rehearser<'p> {
         if !kind.advances_time() {
             let load = self.state.load;
             self.schedule.set_clock(self.model, &mut self.state, clock, load);
+            if let StageWork::Static { steps, .. } = stage.work {
+                self.look_between_levels(number, steps);
+            }
             return;
         }
         let begins = !std::mem::replace(&mut self.has_moved, true);
@@ -314,26 +322,32 @@ impl<'p> Rehearser<'p> {
         if steps.adaptive.is_some() || steps.end <= time {
             return;
         }
-        let missed = |timeline: &Timeline, derivative: usize, first: f64| {
-            let value = |time| timeline.at(time, 1.0)[derivative];
-            missed_part(value, |time| timeline.next_corner(time), first, [time, steps.end], steps.step)
-        };
-        let of_load = |timeline: Timeline| missed(&timeline, 0, timeline.at(time, 1.0)[0]);
-        // The way is the impulse of the velocity. Kinks are told anyway.
-        let of_motion = |timeline: Timeline| match timeline.next_kink(time) {
-            None => missed(&timeline, 1, 0.0),
-            Some(_) => None,
-        };
-        let mut of_motors = vec![None; self.model.amplitudes.len()];
-        self.model.each_motor(&self.state, &mut |motor| of_motors[motor.amplitude] = Some(motor.slot));
-        let loads = self.schedule.loads(self.model).enumerate().map(|(k, timeline)| match of_motors[k] {
-            None => (Driven::Amplitude(k), of_load(timeline)),
-            Some(slot) => (Driven::Motor(slot), of_motion(timeline)),
-        });
-        let motions = self.schedule.motions(self.model).enumerate();
-        let motions = motions.map(|(k, (_, timeline))| (Driven::Motion(k), of_motion(timeline)));
-        for (what, part) in loads.chain(motions) {
+        let range = [time, steps.end];
+        let mut known = HashMap::new();
+        for (what, timeline) in driven(self.model, &self.schedule, &self.state) {
+            let Some(identity) = timeline.history_identity() else { continue };
+            let (derivative, first) = match what {
+                Driven::Amplitude(_) => (0, timeline.at(time, 1.0)[0]),
+                // The way is the impulse of the velocity. Kinks are told anyway.
+                Driven::Motion(_) | Driven::Motor(_) if timeline.next_kink(time).is_some() => continue,
+                Driven::Motion(_) | Driven::Motor(_) => (1, 0.0),
+            };
+            let look = || missed_between_steps(&timeline, derivative, first, range, steps.step);
+            let part = *known.entry((identity, derivative)).or_insert_with(look);
             let how = part.map(|part| JumpKind::BetweenSteps { part });
+            self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what, how }));
+        }
+    }
+
+    /// Loads, motions and motors whose history rises and falls between two load levels.
+    fn look_between_levels(&mut self, number: usize, levels: usize) {
+        let time = self.state.time;
+        let mut known = HashMap::new();
+        for (what, timeline) in driven(self.model, &self.schedule, &self.state) {
+            let Some(identity) = timeline.history_identity() else { continue };
+            let look = || missed_peak(|load| timeline.at(time, load)[0], &places_to_look(&timeline), levels);
+            let part = *known.entry(identity).or_insert_with(look);
+            let how = part.map(|part| JumpKind::BetweenLevels { part });
             self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what, how }));
         }
     }
@@ -381,6 +395,34 @@ impl<'p> Rehearser<'p> {
             *determined &= whole || (motion.kind == MotionKind::Translation && along(motion.axis));
         }
     }
+}
+
+/// All that histories may drive, with its course in the present stage.
+fn driven<'a>(model: &'a Model, schedule: &'a Schedule, state: &State) -> Vec<(Driven, Timeline<'a>)> {
+    let mut of_motors = vec![None; model.amplitudes.len()];
+    model.each_motor(state, &mut |motor| of_motors[motor.amplitude] = Some(motor.slot));
+    let loads = schedule.loads(model).enumerate();
+    let loads = loads.map(|(k, timeline)| (of_motors[k].map_or(Driven::Amplitude(k), Driven::Motor), timeline));
+    let motions = schedule.motions(model).enumerate().map(|(k, (_, timeline))| (Driven::Motion(k), timeline));
+    loads.chain(motions).collect()
+}
+
+/// What fixed time steps miss of a derivative of a course, see [`missed_part`].
+fn missed_between_steps(timeline: &Timeline, derivative: usize, first: f64, range: [f64; 2], step: f64) -> Option<f64> {
+    let value = |time| timeline.at(time, 1.0)[derivative];
+    match timeline.knows_corners() {
+        true => missed_part(value, |time| timeline.next_corner(time), first, range, step),
+        false => missed_part_of_samples(value, first, range, step),
+    }
+}
+
+/// The load factors of a static stage at which a course may have a peak.
+fn places_to_look(timeline: &Timeline) -> Vec<f64> {
+    if !timeline.knows_corners() {
+        return sampled_load_factors();
+    }
+    let next = |load| timeline.next_corner_of_load(load);
+    std::iter::successors(next(0.0), |&corner| next(corner)).take_while(|&corner| corner < 1.0).collect()
 }
 
 /// The velocity that a motion's node has along it; that of a rotation about another axis is none

@@ -31,7 +31,7 @@ use super::outputs;
 use crate::deck::{Accuracy, Beam, Deck, Diagnostic, HistoryUse, InterpolationWord, StageBody};
 use crate::scene::Scene;
 use crate::study::Outcome;
-use beamsim_core::run::Failure;
+use beamsim_core::run::{Failure, JumpKind, Plan, StageWork, rehearse};
 use search::Search;
 
 /// For a smaller wanted error than this, cubic elements are cheaper than quadratic ones.
@@ -136,7 +136,7 @@ pub fn reach(
     options: StudyOptions,
 ) -> Result<Found, StudyError> {
     let original = Original { text, deck };
-    let pace = first_pace(deck);
+    let pace = first_pace(deck, &scene.plan);
     let sampler = Sampler::of_histories(deck, scene, outputs_of(wanted, scene)?, coarser(pace));
     let own: Vec<Vec<usize>> = deck.beams.iter().map(Beam::element_counts).collect();
     let mut mesher = Mesher {
@@ -184,7 +184,7 @@ fn scaled(pace: Pace, by: f64) -> Pace {
 }
 
 /// The first pace: the longest steps that leave each stage enough of them.
-fn first_pace(deck: &Deck) -> Pace {
+fn first_pace(deck: &Deck, plan: &Plan) -> Pace {
     let mut start = 0.0;
     let (mut fewest, mut longest) = (f64::INFINITY, 0.0_f64);
     for stage in &deck.stages {
@@ -199,7 +199,23 @@ fn first_pace(deck: &Deck) -> Pace {
     }
     let in_motion = shortest_motion(deck) / (LEAST_IN_MOTION * longest);
     let factor = (fewest / LEAST_STEPS).min(in_motion.max(SHORTEST_FIRST_STEP)).log2().floor().exp2();
-    Pace::Steps(factor.min(FIRST_STEP))
+    let factor = factor.min(FIRST_STEP);
+    let shorter = std::iter::successors(Some(factor), |factor| Some(0.5 * factor));
+    let mut shorter = shorter.take_while(|&factor| factor >= SHORTEST_FIRST_STEP);
+    // Where no step sees all loads, the run warns of it.
+    Pace::Steps(shorter.find(|&factor| !misses_a_load(plan, factor)).unwrap_or(factor))
+}
+
+/// True if time steps multiplied by a factor do not see what drives the scene: all variants would agree without it.
+fn misses_a_load(plan: &Plan, factor: f64) -> bool {
+    let mut plan = plan.clone();
+    for stage in &mut plan.stages {
+        if let StageWork::Dynamic(steps) = &mut stage.work {
+            steps.step *= factor;
+            steps.adaptive = None;
+        }
+    }
+    rehearse(&plan).jumps.iter().any(|jump| matches!(jump.how, JumpKind::BetweenSteps { .. }))
 }
 
 /// The shortest interval in which a smooth table moves a motion or a motor; infinite without any.
