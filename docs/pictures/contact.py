@@ -71,6 +71,7 @@ SCENES = {
     "gripper": Scene(
         "contact/scenes/two_finger_gripper", ["left", "right"], rows=3, surfaces=[[[-0.1, 0, 0], [0.1, 0, 0]]], balls={"ball": 0.03},
     ),
+    "tubes": Scene("joints/concentric_tubes_after_snap", ["outer"], view=oblique, rows=12),
 }
 
 
