@@ -264,16 +264,21 @@ fn an_accuracy_that_is_missed_has_a_status_of_its_own_and_the_best_is_written() 
     assert!(!read("history.csv").is_empty());
 }
 
+/// The last value of a column of a deck in `decks/dynamics/`, run with a wanted accuracy that is reached.
+fn end_of_search(folder: &Folder, deck: &str, wanted: f64, column: &str) -> f64 {
+    let deck = format!("{}/decks/dynamics/{deck}.toml", env!("CARGO_MANIFEST_DIR"));
+    let output = folder.beamsim(&["run", &deck, "--accuracy", &wanted.to_string(), "--out", "out"]);
+    assert_eq!(status(&output), 0, "{}", last_line(&output));
+    let history = HistoryReader::read(&folder.0.join("out/history.csv")).unwrap();
+    let number = history.names.iter().position(|name| name == column).unwrap();
+    history.rows.last().unwrap()[number]
+}
+
 /// Steps over the whole of a smooth motion see nothing of it, and two of them agree: shorter ones are taken from the start.
 #[test]
 fn an_accuracy_is_kept_where_motions_are_shorter_than_steps() {
     let folder = Folder::new("short_motion");
-    let deck = format!("{}/decks/dynamics/pin_that_moves_within_a_step.toml", env!("CARGO_MANIFEST_DIR"));
-    let output = folder.beamsim(&["run", &deck, "--accuracy", "1e-3", "--out", "out"]);
-    assert_eq!(status(&output), 0, "{}", last_line(&output));
-    let history = HistoryReader::read(&folder.0.join("out/history.csv")).unwrap();
-    let column = history.names.iter().position(|name| name == "p.ry").unwrap();
-    let came = history.rows.last().unwrap()[column];
+    let came = end_of_search(&folder, "pin_that_moves_within_a_step", 1e-3, "p.ry");
     // (J + m l^2) w' = -m g l sin + m l a cos, by a Runge-Kutta method of order 8.
     assert!((came.abs() - 0.51971).abs() <= 1e-3 * 0.7468, "{came} for 0.51971");
 }
@@ -282,12 +287,7 @@ fn an_accuracy_is_kept_where_motions_are_shorter_than_steps() {
 #[test]
 fn an_accuracy_is_kept_where_pulses_are_shorter_than_steps() {
     let folder = Folder::new("short_pulse");
-    let deck = format!("{}/decks/dynamics/formula_between_steps.toml", env!("CARGO_MANIFEST_DIR"));
-    let output = folder.beamsim(&["run", &deck, "--accuracy", "1e-2", "--out", "out"]);
-    assert_eq!(status(&output), 0, "{}", last_line(&output));
-    let history = HistoryReader::read(&folder.0.join("out/history.csv")).unwrap();
-    let column = history.names.iter().position(|name| name == "a.vx").unwrap();
-    let came = history.rows.last().unwrap()[column];
+    let came = end_of_search(&folder, "formula_between_steps", 1e-2, "a.vx");
     let impulse = 600.0 * 0.0004 * std::f64::consts::PI.sqrt();
     assert!((came - impulse).abs() <= 1e-2 * impulse, "{came} for {impulse}");
 }
@@ -296,13 +296,8 @@ fn an_accuracy_is_kept_where_pulses_are_shorter_than_steps() {
 #[test]
 fn an_accuracy_is_kept_at_nodes_that_other_meshes_do_not_have() {
     let folder = Folder::new("between_nodes");
-    let deck = format!("{}/decks/dynamics/accuracy_between_nodes.toml", env!("CARGO_MANIFEST_DIR"));
     for wanted in [1e-3, 3e-4] {
-        let output = folder.beamsim(&["run", &deck, "--accuracy", &wanted.to_string(), "--out", "out"]);
-        assert_eq!(status(&output), 0, "{}", last_line(&output));
-        let history = HistoryReader::read(&folder.0.join("out/history.csv")).unwrap();
-        let column = history.names.iter().position(|name| name == "b1@0.5.uy").unwrap();
-        let came = history.rows.last().unwrap()[column];
+        let came = end_of_search(&folder, "accuracy_between_nodes", wanted, "b1@0.5.uy");
         // 36 cubic elements an arc; the largest displacement is 0.02618.
         assert!((came - 0.0012150).abs() <= wanted * 0.02618, "{came} for 0.0012150, wanted {wanted:e}");
     }
