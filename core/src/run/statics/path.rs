@@ -84,7 +84,7 @@ impl Path {
     pub fn new(stage: &mut StageRun, steps: usize) -> Result<Option<Self>, Failure> {
         let Some(PathDirection { rate: direction, .. }) = stage.path_direction()? else { return Ok(None) };
         let mut path = Self::with_measure(stage, direction);
-        path.here = path.look(stage, &path.here.clone())?;
+        path.here = path.look(stage, &path.here)?;
         let first = 1.0 / (steps as f64 * path.here.load_rate.abs());
         path.begin_with(stage, first).map(Some)
     }
@@ -100,7 +100,7 @@ impl Path {
         let mut path = Self::with_measure(stage, secant);
         // Load control has come here from a lower load: onward is where the load grows.
         path.here.tangent.fill(Vec3::ZERO);
-        path.here = path.look(stage, &path.here.clone())?;
+        path.here = path.look(stage, &path.here)?;
         path.begin_with(stage, std::f64::consts::SQRT_2 * increment).map(Some)
     }
 
@@ -156,7 +156,7 @@ impl Path {
     }
 
     /// The point at the run's state: its tangent goes on in the direction of `before`.
-    fn look(&mut self, stage: &mut StageRun, before: &PathPoint) -> Result<PathPoint, Failure> {
+    fn look(&self, stage: &mut StageRun, before: &PathPoint) -> Result<PathPoint, Failure> {
         let slots = stage.state.q.len();
         let direction = stage.path_direction()?.unwrap_or_else(|| PathDirection::none(slots));
         // The tangent of the last evaluation tells the pivots.
@@ -184,8 +184,8 @@ impl Path {
 
     /// The point at the run's state, `length` ahead of here, with the bend of the path. Rates of rotation vectors in different
     /// charts have no difference that tells one.
-    fn arrive(&mut self, stage: &mut StageRun, length: f64, charts_changed: bool) -> Result<PathPoint, Failure> {
-        let mut next = self.look(stage, &self.here.clone())?;
+    fn arrive(&self, stage: &mut StageRun, length: f64, charts_changed: bool) -> Result<PathPoint, Failure> {
+        let mut next = self.look(stage, &self.here)?;
         next.bend = match &self.here.bend {
             _ if charts_changed => None,
             Some(bend) if length < SHORTEST_OF_BEND * bend.over => Some(bend.clone()),
