@@ -165,6 +165,7 @@ impl Teller<'_> {
         }
     }
 
+    /// The table or formula of a history.
     fn body_of(&self, history: Option<&str>) -> Option<&HistoryBody> {
         let named = |table: &&HistoryTable| Some(table.name.value.as_str()) == history;
         self.deck.histories.iter().find(named).map(|table| &table.body)

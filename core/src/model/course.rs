@@ -303,7 +303,8 @@ impl<'a> Timeline<'a> {
 
     /// The first load factor behind `load` in a static stage at which its history is not smooth, or bends most.
     pub fn next_corner_of_load(&self, load: f64) -> Option<f64> {
-        self.amplitude.history.as_ref()?.next_corner_of_load(load)
+        // Load factors have no clock of their own.
+        self.amplitude.history.as_ref()?.next_corner(&HistoryClock::default(), load)
     }
 
     /// True if its history knows where it bends.

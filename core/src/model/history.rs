@@ -140,11 +140,6 @@ impl Reading {
         next_on_clock(clock, time, |x| self.function.next_corner(x))
     }
 
-    /// The first load factor after `load` in a static stage at which the function is not smooth, or bends most.
-    pub fn next_corner_of_load(&self, load: f64) -> Option<f64> {
-        self.function.next_corner(load)
-    }
-
     /// True if the function knows where it bends.
     pub fn knows_corners(&self) -> bool {
         self.function.knows_corners()
