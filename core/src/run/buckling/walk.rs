@@ -77,6 +77,7 @@ fn step_along(stage: &mut StageRun, load: f64) -> Option<f64> {
 pub fn has_leapt(stage: &mut StageRun, from: &State) -> Result<bool, Failure> {
     let (to, step) = (stage.state.clone(), stage.state.load - from.load);
     stage.state.copy_from(from);
+    // With the stiffness that contacts had on the way: what they gave way is no leap.
     let direction = stage.path_direction()?;
     let ahead = direction.map_or(0.0, |PathDirection { rate, .. }| {
         let mut ahead = from.clone();
