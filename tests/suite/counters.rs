@@ -5,8 +5,9 @@ use beamsim::scene::{self, Scene};
 use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot};
 use std::path::{Path, PathBuf};
 
-/// Scenes of each kind of work: statics in space and in a plane, paths, dynamics, charts, joints, modes, and the linear theory.
-const DECKS: [&str; 14] = [
+/// Scenes of each kind of work: statics in space and in a plane, paths, dynamics, charts, joints, modes, the linear theory, and
+/// searches for critical loads and a path of which many steps are refused.
+const DECKS: [&str; 16] = [
     "bend45",
     "bend45_order3",
     "right_angle_coarse",
@@ -21,6 +22,8 @@ const DECKS: [&str; 14] = [
     "minimal/modal",
     "minimal/spring_between",
     "minimal/buckling",
+    "stability/portal_that_turns_aside",
+    "joints/concentric_tubes_limit",
 ];
 
 struct Silent;

@@ -39,6 +39,9 @@ pub struct Newton {
     /// Largest ratio of successive corrections of the last solution, above round-off; small if the
     /// iteration follows the path
     pub(crate) contraction: f64,
+    /// A solution ends without a result where corrections contract by more than this: a step that
+    /// would be refused costs no more of them. Infinite unless a caller sets it.
+    pub(crate) largest_contraction: f64,
     /// True if a correction of the last solution was shortened, so that centre lines of beams do not
     /// cross
     pub(crate) was_shortened: bool,
@@ -90,6 +93,7 @@ impl Newton {
             last: None,
             first: CompressedField::default(),
             contraction: 0.0,
+            largest_contraction: f64::INFINITY,
             was_shortened: false,
             is_short: false,
             reuse: Reuse::new(),
@@ -345,6 +349,9 @@ impl Solution<'_> {
         }
         if length > DIVERGED_IN_CONTACT && self.method.changes_charts() && self.state.contacts.touches() {
             return Err(self.not_converged(residual));
+        }
+        if contraction(self.newton.last, length) > self.newton.largest_contraction {
+            return Err(NewtonFailure::NotConverged { residual, history: self.newton.reuse.history.clone() });
         }
         Ok(length)
     }

@@ -64,8 +64,9 @@ pub fn continue_path(stage: &mut StageRun, target: f64) -> Result<Walked, Failur
 
 /// One step along the path: how far it moved, where it came down near by.
 fn step_along(stage: &mut StageRun, load: f64) -> Option<f64> {
-    stage.attempt(load).ok()?;
-    if stage.newton.contraction > LARGEST_CONTRACTION && !stage.is_linear() {
+    let largest = if stage.is_linear() { f64::INFINITY } else { LARGEST_CONTRACTION };
+    stage.attempt_within(load, largest).ok()?;
+    if stage.newton.contraction > largest {
         return None;
     }
     let moved = distance(stage.model, stage.good, stage.state);

@@ -296,7 +296,7 @@ impl LevelControl<'_, '_> {
     }
 
     fn try_step(&mut self, next: f64) -> StepOutcome {
-        if let Err(failure) = self.stage.attempt(next) {
+        if let Err(failure) = self.stage.attempt_within(next, self.refused_contraction()) {
             return StepOutcome::Failed(failure);
         }
         let signature = self.stability.look(self.stage);
@@ -328,6 +328,13 @@ impl LevelControl<'_, '_> {
         }
     }
 
+    /// The contraction of corrections beyond which the next step will be taken half as long, whatever
+    /// state they lead to.
+    fn refused_contraction(&self) -> f64 {
+        let is_refused = !self.stage.soft && self.levels.may_halve(false);
+        if is_refused { self.stability.largest_contraction(self.stability.signature) } else { f64::INFINITY }
+    }
+
     /// True if points with friction have come into contact on the way to a balanced state: their way before
     /// that counts as sliding.
     fn touches_late(&self) -> bool {
@@ -352,7 +359,10 @@ impl LevelControl<'_, '_> {
             self.stage.newton.begin_with(&self.stage.assembly.system);
         }
         self.touch = self.touch.filter(|&touch| touch > self.stage.good.load);
-        self.levels.double();
+        // What corrections do where points touch tells nothing.
+        let touches = self.stage.state.contacts.touches() || self.stage.contact_change != ContactChange::None;
+        let contraction = if touches { 0.0 } else { self.stage.newton.contraction };
+        self.levels.lengthen(contraction, self.stability.largest_contraction(signature));
         Ok(())
     }
 

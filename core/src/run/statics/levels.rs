@@ -75,14 +75,18 @@ impl Levels {
     /// Takes the next step half as long; `false` where it may not be. `soft`: round-off takes the
     /// stiffness of the softest motion.
     pub fn halve(&mut self, soft: bool) -> bool {
-        let smaller = 0.5 * self.increment;
+        let may = self.may_halve(soft);
+        self.increment = if may { 0.5 * self.increment } else { self.increment };
+        may
+    }
+
+    /// True if the next step may be half as long.
+    pub fn may_halve(&self, soft: bool) -> bool {
         let smallest = match soft {
             true => SMALLEST_SOFT_PART * self.level,
             false => (SMALLEST_PART * self.level).min(SMALLEST_OF_STAGE),
         };
-        let may = self.approach != Approach::Straight && smaller >= smallest;
-        self.increment = if may { smaller } else { self.increment };
-        may
+        self.approach != Approach::Straight && 0.5 * self.increment >= smallest
     }
 
     /// The last step that was tried was no longer than this.
@@ -90,9 +94,12 @@ impl Levels {
         self.increment = self.increment.min(tried);
     }
 
-    /// After a step that was taken.
-    pub fn double(&mut self) {
-        self.increment = (2.0 * self.increment).min(self.level);
+    /// After a step that was taken: the next one is twice as long, unless its corrections would contract
+    /// by more than `largest`. Their `contraction` grows in proportion to the step.
+    pub fn lengthen(&mut self, contraction: f64, largest: f64) {
+        if 2.0 * contraction <= largest {
+            self.increment = (2.0 * self.increment).min(self.level);
+        }
     }
 
     /// Load control begins anew.

@@ -44,6 +44,17 @@ impl StageRun<'_> {
         if self.model.contacts().is_some() { self.attempt_with_contacts(load) } else { self.attempt_once(load) }
     }
 
+    /// An attempt that ends without a balance where a correction is larger than this part of the one
+    /// before it. Where points may touch it goes on: they come and go between iterations.
+    pub fn attempt_within(&mut self, load: f64, largest_contraction: f64) -> Result<(), NewtonFailure> {
+        if self.model.contacts().is_none() {
+            self.newton.largest_contraction = largest_contraction;
+        }
+        let attempt = self.attempt(load);
+        self.newton.largest_contraction = f64::INFINITY;
+        attempt
+    }
+
     /// One solution of Newton's method at a load factor.
     pub(super) fn attempt_once(&mut self, load: f64) -> Result<(), NewtonFailure> {
         let moves = self.set_load(load)?;

@@ -207,7 +207,9 @@ impl Path {
     pub fn step(&mut self, stage: &mut StageRun) -> Result<(PathPoint, f64), Failure> {
         loop {
             let length = self.length;
-            let failure = match self.advance(stage, length) {
+            let is_believed = length <= BELIEVED * self.first;
+            let largest_contraction = if is_believed { f64::INFINITY } else { LARGEST_CONTRACTION };
+            let failure = match self.advance(stage, length, largest_contraction) {
                 Ok(Corrected { iterations, contraction, charts_changed }) => {
                     let next = match self.arrive(stage, length, charts_changed) {
                         Ok(next) => next,
@@ -219,8 +221,7 @@ impl Path {
                     let cosine = dot(stage, &next.tangent, &self.here.tangent) * self.scale
                         + next.load_rate * self.here.load_rate;
                     let straight = cosine.min(length / self.chord(stage, &next)) >= MIN_COSINE;
-                    let has_strayed = contraction > LARGEST_CONTRACTION || self.may_have_jumped(&next);
-                    let fine = straight && !(has_strayed && length > BELIEVED * self.first);
+                    let fine = straight && (is_believed || !self.may_have_jumped(&next));
                     if fine || length <= SHORTEST * self.first {
                         let by_iterations = (EASY / iterations.max(1) as f64).sqrt();
                         let by_contraction = (STEADY_CONTRACTION / contraction).cbrt();
@@ -278,7 +279,7 @@ impl Path {
 
     /// Goes `length` along the tangent and back to the path; leaves the run's state there and
     /// returns how the corrections went.
-    fn advance(&self, stage: &mut StageRun, length: f64) -> Result<Corrected, NewtonFailure> {
+    fn advance(&self, stage: &mut StageRun, length: f64, largest_contraction: f64) -> Result<Corrected, NewtonFailure> {
         let mut load = self.predict(stage, length);
         stage.assembly.forget();
         let round_off = stage.assembly.round_off(stage.state);
@@ -315,12 +316,13 @@ impl Path {
             }
             let (dq, dl) = self.correction(stage, &pull)?;
             let wild = dq.iter().any(|d| !d.is_finite()) || !dl.is_finite();
-            if wild || squared(stage, &dq) * self.scale + dl * dl > (FLIGHT * length).powi(2) {
+            let size = solve::size(stage.model, &dq);
+            done.contraction = done.contraction.max(solve::contraction(last, size));
+            let flies = squared(stage, &dq) * self.scale + dl * dl > (FLIGHT * length).powi(2);
+            if wild || flies || done.contraction > largest_contraction {
                 return Err(NewtonFailure::NotConverged { residual, history });
             }
             load += dl;
-            let size = solve::size(stage.model, &dq);
-            done.contraction = done.contraction.max(solve::contraction(last, size));
             let switched = correct(stage, &dq);
             done.charts_changed |= switched;
             // What was a correction before is none in a new chart.
@@ -420,7 +422,7 @@ impl Path {
         for _ in 0..MOST_LOOKS {
             let share = if high.value == low.value { 0.5 } else { -low.value / (high.value - low.value) };
             let at = low.at + (high.at - low.at) * share.clamp(0.02, 0.98);
-            let Corrected { charts_changed, .. } = self.advance(stage, at).ok()?;
+            let Corrected { charts_changed, .. } = self.advance(stage, at, f64::INFINITY).ok()?;
             let point = self.arrive(stage, at, charts_changed).ok()?;
             let value = target.value(&point);
             found = (point, at);

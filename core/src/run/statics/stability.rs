@@ -86,9 +86,14 @@ impl Stability {
     /// contract, or it passed several critical points at once, of which each may have a branch that
     /// the path turns into.
     pub fn may_have_strayed(&self, contraction: f64, signature: Option<Signature>) -> bool {
+        contraction > self.largest_contraction(signature) || self.changes_to(signature) > 1
+    }
+
+    /// The largest contraction of corrections that is trusted on the way to a state with this
+    /// signature.
+    pub fn largest_contraction(&self, signature: Option<Signature>) -> f64 {
         let is_counted = [self.signature, signature].iter().all(|s| s.and_then(Signature::negative).is_some());
-        let largest = if is_counted { LARGEST_CONTRACTION } else { LARGEST_UNCOUNTED };
-        contraction > largest || self.changes_to(signature) > 1
+        if is_counted { LARGEST_CONTRACTION } else { LARGEST_UNCOUNTED }
     }
 }
 
