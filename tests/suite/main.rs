@@ -9,6 +9,7 @@ mod coefficients;
 mod command;
 mod constraints;
 mod contact_jumps;
+mod contact_rims;
 mod contacts;
 mod convergence;
 mod corners;

@@ -13,7 +13,7 @@ use super::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
 use super::strand::{ChainNode, Strand};
 use super::surface::SceneSurface;
 use crate::kernel::MAX_NODES;
-use crate::kernel::contact::along::{intervals_of_convex, minima_on, place_and_slope, place_on};
+use crate::kernel::contact::along::{minima_on, place_and_slope, place_on};
 use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface};
 use crate::system::{ChainMemory, Clearance, ContactRegime, PointMemory, State};
 use crate::tensor::Vec3;
@@ -124,8 +124,19 @@ impl Chain {
         let seen = SeenChain { chain: self, surface, places, free: (Vec3::ZERO, -1.0), points: &[], regime };
         let nodes = (0..seen.places.len()).filter(|&node| seen.touches(node)).map(|node| gap(seen.places[node]));
         let nodes = nodes.fold(f64::INFINITY, f64::min);
-        let elements = 0..if self.order == 0 { 0 } else { self.elements() };
-        elements.flat_map(|k| seen.closest(k)).map(gap).fold(nodes, f64::min)
+        let of_edges = |k: usize| {
+            let gap = |candidate: Candidate| {
+                let place = seen.place(k, candidate.s);
+                let of_edge = candidate.distance(surface, place).map_or(f64::INFINITY, |it| it.value - self.radius);
+                of_edge.min(gap(place))
+            };
+            seen.closest_to_edges(k).into_iter().map(gap).fold(f64::INFINITY, f64::min)
+        };
+        let of_surface = |k: usize| {
+            let minima = seen.minima(k);
+            minima.found().iter().map(|minimum| gap(seen.place(k, minimum.s))).fold(f64::INFINITY, f64::min)
+        };
+        (0..self.elements()).map(|k| of_surface(k).min(of_edges(k))).fold(nodes, f64::min)
     }
 
     /// The first node at which the surface has no normal, and its penetration, if that is more than
@@ -147,7 +158,7 @@ impl Chain {
 
     /// The elements that cross a box or a mesh.
     pub(super) fn crossings(&self, surface: &Surface, carrier: &Carrier, at: &State) -> Vec<Crossing> {
-        if self.order == 0 || !surface.has_edges() {
+        if self.order == 0 || !surface.is_faceted() {
             return Vec::new();
         }
         let places = self.seen(carrier, at);
@@ -374,18 +385,11 @@ impl SeenChain<'_> {
         }
     }
 
-    /// The places of all closest points between the ends of element `k`.
-    fn closest(&self, k: usize) -> Vec<Vec3> {
-        let of_surface = self.minima(k);
-        let of_edges = self.closest_to_edges(k).into_iter().map(|candidate| candidate.s);
-        of_surface.found().iter().map(|minimum| minimum.s).chain(of_edges).map(|s| self.place(k, s)).collect()
-    }
-
     /// Adds the closest points between the ends of element `k`. The edge of a body that has come inside the
     /// section pushes it out, too, from the place where it is.
     fn add_minima(&self, k: usize, candidates: &mut Vec<Candidate>) {
-        // The node of a body touches edges and corners by its distance from the whole surface.
         if self.chain.order == 0 {
+            candidates.extend(self.closest_to_edges(k));
             return;
         }
         let distance = |y: Vec3| self.surface.distance(y).ok();
@@ -396,7 +400,7 @@ impl SeenChain<'_> {
                 MinimumKind::Kink | MinimumKind::Conforming => continue,
             };
             // Those at edges and corners are found by the distance from the edge.
-            if place == Place::Closest && self.surface.has_edges() {
+            if place == Place::Closest && self.surface.is_faceted() {
                 continue;
             }
             let weight = match place {
@@ -434,6 +438,14 @@ impl SeenChain<'_> {
         let mut found = Vec::new();
         for number in self.edges_of(k) {
             let Some(edge) = self.surface.edge(number) else { continue };
+            if self.chain.order == 0 {
+                // The node of a body touches edges and corners by its distance from the whole surface, which has
+                // none beyond a rim.
+                let is_beyond = self.surface.distance(self.places[k]).is_err() && edge.is_beside(self.places[k]);
+                let at = Candidate { element: k, s: 0.0, place: Place::Fixed, edge: Some(number), weight: 1.0 };
+                found.extend(is_beyond.then_some(at));
+                continue;
+            }
             let is_beside = |s: f64| {
                 let place = self.place(k, s);
                 edge.is_beside(place) && self.surface.owns_corner(number, place)
@@ -441,7 +453,7 @@ impl SeenChain<'_> {
             let at = |s: f64, place: Place, weight: f64| Candidate { element: k, s, place, edge: Some(number), weight };
             let distance = |y: Vec3| edge.distance(y).ok();
             let nodes = self.places_of(k);
-            let minima = minima_on(nodes, intervals_of_convex(nodes.len()), &distance);
+            let minima = minima_on(nodes, edge.intervals(self.surface, nodes), &distance);
             let smooth = minima.found().iter().filter(|minimum| minimum.kind != MinimumKind::Kink);
             let beside = smooth.filter(|minimum| is_beside(minimum.s));
             found.extend(beside.map(|minimum| at(minimum.s, Place::Closest, self.weight(k, &distance))));

@@ -165,6 +165,15 @@ impl<'a> ChainNow<'a> {
         }
     }
 
+    /// A slot of a candidate inside of the surface where that has no normal.
+    pub(super) fn lost(&self) -> Option<Slot> {
+        let is_lost = |candidate: &&Candidate| {
+            let seen = self.carrier.on_surface(self.place(candidate));
+            candidate.edge.is_none() && self.surface.surface.is_lost(seen, self.chain.radius)
+        };
+        self.candidates.iter().find(is_lost).map(|candidate| self.slot_of(candidate))
+    }
+
     /// True if a point is nearer to the middle of the surface than to its face, or has come through it since
     /// an earlier state.
     pub(super) fn has_sunk(&self, point: &PointNow, from: &State) -> bool {

@@ -237,16 +237,25 @@ impl SurfaceContacts {
         self.pairs().judge_penalty(at);
     }
 
-    /// A node at a point that may be on a wrong side of its surface: one with friction whose normal has turned
-    /// over since the last converged state `from`; after a time step also one that is nearer to the middle
-    /// of the surface than to its face, from where it may come out on another side, or that has come out.
+    /// A node at a point that may be on a wrong side of its surface: one on the axis of a body, where no force
+    /// pushes it out; one with friction whose normal has turned over since the last converged state `from`; after
+    /// a time step also one that is nearer to the middle of the surface than to its face, from where it may come
+    /// out on another side, or that has come out.
     fn strayed(&self, from: &State, at: &State) -> Option<Slot> {
         let is_penalty = at.contacts.regime == ContactRegime::Penalty;
         let may_sink = |chain: &Chain| is_penalty && self.surfaces[chain.surface].depth().is_finite();
         let may_stray = |chain: &Chain| may_sink(chain) || self.laws[chain.contact].rubs();
+        let has_axis = |chain: &Chain| self.surfaces[chain.surface].depth().is_finite();
         let mut strayed = None;
-        for number in (0..self.chains.len()).filter(|&k| may_stray(&self.chains[k]) && self.is_near(k, at)) {
+        let looked_at = |chain: &Chain| has_axis(chain) || may_stray(chain);
+        for number in (0..self.chains.len()).filter(|&k| looked_at(&self.chains[k]) && self.is_near(k, at)) {
             let chain = self.chain_now(number, at, Weights::NONE);
+            if let Some(slot) = chain.lost() {
+                return Some(slot);
+            }
+            if !may_stray(chain.chain) {
+                continue;
+            }
             let sinks = may_sink(chain.chain);
             chain.each_point(Weights::NONE, &mut |point, _| {
                 if point.state.traction.turned_over || (sinks && chain.has_sunk(point, from)) {
@@ -261,7 +270,7 @@ impl SurfaceContacts {
     /// of a node on the next face, does not.
     fn crossing(&self, number: usize, at: &State) -> Option<Slot> {
         let (chain, surface) = (&self.chains[number], &self.surfaces[self.chains[number].surface]);
-        if !surface.surface.has_edges() || !self.is_near(number, at) {
+        if !surface.surface.is_faceted() || !self.is_near(number, at) {
             return None;
         }
         let crossings = chain.crossings(&surface.surface, &surface.carrier(at, Weights::NONE), at);

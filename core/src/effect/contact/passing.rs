@@ -86,17 +86,19 @@ impl Way<'_> {
 /// may have come out on another side. Steps are as long as the distance is from that depth, which
 /// cannot be reached in a shorter one.
 fn goes_deeper(surface: &Surface, from: Vec3, to: Vec3, radius: f64) -> bool {
-    let [Ok(first), Ok(last)] = [from, to].map(|place| surface.distance(place)) else { return false };
-    let least = first.value.min(last.value).min(radius) - 0.5 * radius;
+    // Also on an axis, where there is no normal
+    let height = |place: Vec3| surface.value(place, radius);
+    let [Some(first), Some(last)] = [from, to].map(height) else { return false };
+    let least = first.min(last).min(radius) - 0.5 * radius;
     let way = to - from;
     let length = way.norm();
     let mut done = 0.0;
     while done < length {
-        let Ok(here) = surface.distance(from + way * (done / length)) else { return false };
-        if here.value < least {
+        let Some(here) = height(from + way * (done / length)) else { return false };
+        if here < least {
             return true;
         }
-        done += (here.value - least).max(SHORTEST_LOOK * radius);
+        done += (here - least).max(SHORTEST_LOOK * radius);
     }
     false
 }

@@ -64,6 +64,16 @@ impl Cone {
         [self.from, self.from + self.axis * self.length]
     }
 
+    /// The direction from the first to the second end.
+    pub(super) fn axis(&self) -> Vec3 {
+        self.axis
+    }
+
+    /// The component of the normal of its side along the axis.
+    pub(super) fn tilt(&self) -> f64 {
+        self.tilt
+    }
+
     /// The radii at both ends.
     pub(super) fn radii(&self) -> [f64; 2] {
         self.radii

@@ -1,4 +1,5 @@
-//! The edges that beams touch: of boxes from outside, of triangle meshes where they protrude.
+//! The edges that beams touch: of boxes from outside, of triangle meshes where they protrude, and the
+//! rims of the open ends of tubes.
 //!
 //! A beam that lies across a box touches its edges, also where the distance from the box has no
 //! minimum along the beam, as over a face that the beam is parallel to. Each edge is touched at the
@@ -11,18 +12,33 @@
 //!
 //! Beside the edge this is the distance from the box ([`super::surface`]); over its faces it is
 //! larger. Of the edges that meet at a corner one touches what is nearest to the corner.
+//!
+//! A rim is the circle where the wall of a tube ends; its distance is that of a torus of no thickness
+//! ([`super::surface`]). A wire that crosses it at an angle is pushed across its own direction, not
+//! across that of the wall: so it does no work on a wire that slides out without friction.
 
+use super::along::intervals_of_convex;
 use super::distance::{Distance, Feature, Side, Undefined, cylinder, sphere};
-use super::surface::{Shape, Surface};
+use super::surface::{Shape, Surface, torus};
+use super::tube::Rim;
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 
 /// Number of edges of a box.
 const EDGES: u32 = 12;
 
+/// An edge, in the axes of the surface's carrier.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Edge {
+    /// Of a box or a mesh
+    Straight(StraightEdge),
+    /// Of an open end of a tube, with the side of the wall on which beams are
+    Rim(Rim, Side),
+}
+
 /// An edge of a box or a mesh, in the axes of the surface's carrier.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub struct StraightEdge {
     middle: Vec3,
     /// Its direction
     along: Vec3,
@@ -39,6 +55,20 @@ impl Surface {
     /// True if closest points to edges are contact points of their own.
     pub fn has_edges(&self) -> bool {
         match &self.shape {
+            Shape::Tube(tube) => tube.rim(0).is_some(),
+            Shape::Plane { .. }
+            | Shape::Sphere { .. }
+            | Shape::Cylinder { .. }
+            | Shape::Cone(_)
+            | Shape::Torus { .. }
+            | Shape::Box { .. }
+            | Shape::Mesh(_) => self.is_faceted(),
+        }
+    }
+
+    /// True if flat faces meet at its edges.
+    pub fn is_faceted(&self) -> bool {
+        match &self.shape {
             Shape::Box { .. } => self.side == Side::Outside,
             Shape::Mesh(_) => true,
             Shape::Plane { .. }
@@ -53,13 +83,13 @@ impl Surface {
     /// False where the closest point of an edge to `y` is a corner that another edge has: one of which
     /// the closest point is between its ends, or the one with the smallest number.
     pub fn owns_corner(&self, number: u32, y: Vec3) -> bool {
-        let Some(edge) = self.edge(number) else { return true };
+        let Some(Edge::Straight(edge)) = self.edge(number) else { return true };
         let along = edge.along.dot(y - edge.middle);
         if along.abs() < edge.half {
             return true;
         }
         let has_it = |(other, end): (u32, f64)| {
-            let Some(edge) = self.edge(other).filter(|_| other != number) else { return false };
+            let Some(Edge::Straight(edge)) = self.edge(other).filter(|_| other != number) else { return false };
             let along = edge.along.dot(y - edge.middle);
             along.abs() < edge.half || (other < number && along * end > 0.0)
         };
@@ -87,34 +117,40 @@ impl Surface {
         match &self.shape {
             Shape::Mesh(mesh) => mesh.edges_near(line, reach, self.side),
             Shape::Box { .. } if self.side == Side::Outside => (0..EDGES).collect(),
+            Shape::Tube(tube) => {
+                let (middle, half) = ((line[0] + line[1]) * 0.5, 0.5 * (line[1] - line[0]).norm());
+                (0..2)
+                    .filter(|&number| tube.rim(number).is_some_and(|rim| rim.is_within(half + reach, middle)))
+                    .collect()
+            }
             Shape::Box { .. }
             | Shape::Plane { .. }
             | Shape::Sphere { .. }
             | Shape::Cylinder { .. }
             | Shape::Cone(_)
-            | Shape::Torus { .. }
-            | Shape::Tube(_) => Vec::new(),
+            | Shape::Torus { .. } => Vec::new(),
         }
     }
 
     /// The edge with a number; `None` for surfaces without edges.
     pub fn edge(&self, number: u32) -> Option<Edge> {
         match &self.shape {
-            Shape::Box { centre, axes, half } => Some(edge_of_box(*centre, axes, *half, number)),
+            Shape::Box { centre, axes, half } => Some(Edge::Straight(edge_of_box(*centre, axes, *half, number))),
+            Shape::Tube(tube) => Some(Edge::Rim(tube.rim(number)?, self.side)),
             Shape::Mesh(mesh) => {
                 let (middle, along, half, outward) = mesh.edge(number)?;
                 let normals = match self.side {
                     Side::Outside => outward,
                     Side::Inside => outward.map(|normal| -normal),
                 };
-                Some(Edge { middle, along, half, normals, depths: [f64::INFINITY; 2] })
+                let edge = StraightEdge { middle, along, half, normals, depths: [f64::INFINITY; 2] };
+                Some(Edge::Straight(edge))
             }
             Shape::Plane { .. }
             | Shape::Sphere { .. }
             | Shape::Cylinder { .. }
             | Shape::Cone(_)
-            | Shape::Torus { .. }
-            | Shape::Tube(_) => None,
+            | Shape::Torus { .. } => None,
         }
     }
 }
@@ -133,19 +169,55 @@ fn edges_at_corner_of_box(number: u32, end: f64) -> Vec<(u32, f64)> {
     (0..3).map(edge).collect()
 }
 
-fn edge_of_box(centre: Vec3, axes: &Mat3, half: [f64; 3], number: u32) -> Edge {
+fn edge_of_box(centre: Vec3, axes: &Mat3, half: [f64; 3], number: u32) -> StraightEdge {
     let along = (number / 4) as usize;
     let others = [(along + 1) % 3, (along + 2) % 3];
     let signs = [1, 2].map(|bit| if number & bit == 0 { 1.0 } else { -1.0 });
     let normals = [0, 1].map(|k| axes.column(others[k]) * signs[k]);
     let depths = others.map(|axis| half[axis]);
     let middle = centre + normals[0] * depths[0] + normals[1] * depths[1];
-    Edge { middle, along: axes.column(along), half: half[along], normals, depths }
+    StraightEdge { middle, along: axes.column(along), half: half[along], normals, depths }
 }
 
 impl Edge {
     /// The distance of the point `y` from the edge.
     pub fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
+        match self {
+            Self::Straight(edge) => edge.distance(y),
+            Self::Rim(rim, _) => {
+                let ring = torus(y - Vec3::constant(rim.centre), rim.outward, rim.radius, 0.0)?;
+                Ok(Distance { feature: Feature::Edge, ..ring })
+            }
+        }
+    }
+
+    /// True if the point `y` is outside of the faces of the edge, and nearer to this edge than to
+    /// those on the other sides of its faces.
+    pub fn is_beside(&self, y: Vec3) -> bool {
+        match self {
+            Self::Straight(edge) => edge.is_beside(y),
+            Self::Rim(rim, side) => {
+                let [beyond, across] = rim.sees(y);
+                let is_off_the_wall = match side {
+                    Side::Inside => across < rim.radius,
+                    Side::Outside => across > rim.radius,
+                };
+                beyond > 0.0 || is_off_the_wall
+            }
+        }
+    }
+
+    /// Parts of an element, each of which has one local minimum of the distance at most.
+    pub fn intervals(&self, surface: &Surface, nodes: &[Vec3]) -> usize {
+        match self {
+            Self::Straight(_) => intervals_of_convex(nodes.len()),
+            Self::Rim(..) => surface.intervals(nodes),
+        }
+    }
+}
+
+impl StraightEdge {
+    fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
         let d = y - Vec3::constant(self.middle);
         let along = Vec3::constant(self.along).dot(d).largest();
         if along.abs() <= self.half {
@@ -156,9 +228,7 @@ impl Edge {
         }
     }
 
-    /// True if the point `y` is outside of the faces of the edge, and nearer to this edge than to
-    /// those on the other sides of its faces.
-    pub fn is_beside(&self, y: Vec3) -> bool {
+    fn is_beside(&self, y: Vec3) -> bool {
         let d = y - self.middle;
         let heights = self.normals.map(|normal| normal.dot(d));
         let is_outside = heights[0] > 0.0 || heights[1] > 0.0;
@@ -170,6 +240,7 @@ impl Edge {
 #[cfg(test)]
 mod tests {
     use super::super::dual::{Random, jacobian, variables};
+    use super::super::tube::{Tube, TubeEnds};
     use super::*;
 
     fn cuboid(random: &mut Random) -> Surface {
@@ -217,6 +288,42 @@ mod tests {
             }
         }
         assert!(strips > 200, "{strips}");
+    }
+
+    #[test]
+    fn rims_have_the_distance_of_a_circle() {
+        let mut random = Random(9);
+        let points = [Vec3::ZERO, Vec3([1.0, 0.2, 0.1]), Vec3([2.1, 0.9, 0.0])];
+        for radii in [[0.3; 3], [0.3, 0.2, 0.25], [0.2, 0.3, 0.4]] {
+            let tubes =
+                [Tube::straight(&points, &radii, TubeEnds::Open), Tube::smooth(&points, &radii, TubeEnds::Open)];
+            for (tube, side) in tubes.into_iter().zip([Side::Inside, Side::Outside]) {
+                let surface = Surface { shape: Shape::Tube(tube.unwrap()), side };
+                for number in 0..2 {
+                    let Some(edge @ Edge::Rim(rim, _)) = surface.edge(number) else { panic!("no rim") };
+                    for _ in 0..50 {
+                        let y = random.vector(2.0);
+                        let (exact, here) = (edge.distance(variables::<3>(y, 0)).unwrap(), edge.distance(y).unwrap());
+                        let size = 1.0 + here.curvature.max_abs();
+                        assert!((Vec3(exact.value.partials) - here.normal).max_abs() < 1e-13 * size);
+                        assert!((jacobian(exact.normal, 0) - here.curvature).max_abs() < 1e-13 * size * size);
+                        let foot = edge.distance(y - here.normal * here.value * (1.0 - 1e-9)).unwrap();
+                        assert!(foot.value < 1e-8, "{foot:?}");
+                    }
+                    // The wall ends at the rim: there it is still there, and not beyond.
+                    for _ in 0..10 {
+                        let across = rim.outward.cross(random.direction()).normalized().unwrap();
+                        let on_rim = rim.centre + across * rim.radius;
+                        let within = surface.distance(on_rim - rim.outward * 1e-9).unwrap();
+                        assert!(within.value.abs() < 1e-8, "{within:?}");
+                        let beyond = surface.distance(on_rim + rim.outward * 1e-6);
+                        assert_eq!(beyond.unwrap_err(), Undefined::BeyondEnd);
+                    }
+                }
+            }
+        }
+        let closed = Tube::straight(&points, &[0.3; 3], TubeEnds::Round).unwrap();
+        assert!(!Surface { shape: Shape::Tube(closed), side: Side::Inside }.has_edges());
     }
 
     #[test]

@@ -137,8 +137,21 @@ impl Surface {
     pub fn value(&self, y: Vec3, size: f64) -> Option<f64> {
         // Not along any axis that users choose.
         const ASIDE: Vec3 = Vec3([0.613, 0.524, 0.592]);
-        let steps = [0.0, 1e-6, 1e-3, 1.0];
-        steps.into_iter().find_map(|step| self.distance(y + ASIDE * (step * size)).ok()).map(|distance| distance.value)
+        match self.distance(y) {
+            Ok(distance) => Some(distance.value),
+            Err(Undefined::BeyondEnd) => None,
+            Err(Undefined::Centre | Undefined::Axis | Undefined::Ring | Undefined::NotUnique) => {
+                let steps = [1e-6, 1e-3, 1.0];
+                let beside = steps.into_iter().find_map(|step| self.distance(y + ASIDE * (step * size)).ok());
+                beside.map(|distance| distance.value)
+            }
+        }
+    }
+
+    /// True for a point inside of a body at which it has no normal: no force pushes it out. `size`: see
+    /// [`Surface::value`].
+    pub fn is_lost(&self, y: Vec3, size: f64) -> bool {
+        self.distance(y).is_err() && self.value(y, size).is_some_and(|value| value < 0.0)
     }
 }
 
@@ -173,7 +186,7 @@ impl Shape {
     }
 }
 
-fn torus<T: Real>(d: Vec3<T>, axis: Vec3, ring: f64, radius: f64) -> Result<Distance<T>, Undefined> {
+pub(super) fn torus<T: Real>(d: Vec3<T>, axis: Vec3, ring: f64, radius: f64) -> Result<Distance<T>, Undefined> {
     let e = Vec3::constant(axis);
     let z = e.dot(d);
     let q = d - e * z;

@@ -59,6 +59,30 @@ pub struct Tube {
     least_radius: f64,
 }
 
+/// The circle where the wall of a tube ends, in the axes of the carrier.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rim {
+    pub(super) centre: Vec3,
+    /// Unit vector along the centre line, out of the tube
+    pub(super) outward: Vec3,
+    pub(super) radius: f64,
+}
+
+impl Rim {
+    /// How far a point is beyond the plane of the rim, and from its axis.
+    pub(super) fn sees(&self, y: Vec3) -> [f64; 2] {
+        let d = y - self.centre;
+        let beyond = self.outward.dot(d);
+        [beyond, (d - self.outward * beyond).norm()]
+    }
+
+    /// True if a point is no farther than `reach` from the circle.
+    pub(super) fn is_within(&self, reach: f64, y: Vec3) -> bool {
+        let [beyond, across] = self.sees(y);
+        beyond.hypot(across - self.radius) <= reach
+    }
+}
+
 #[derive(Clone, Debug, PartialEq)]
 enum CentreLine {
     Straight(Vec<Cone>),
@@ -201,6 +225,35 @@ impl Tube {
     /// The least radius.
     pub fn least_radius(&self) -> f64 {
         self.least_radius
+    }
+
+    /// The rim at the first end (0) or the last one (1); `None` where that is not open. The wall ends where its
+    /// closest point is that of the centre line's end. Straight pieces have spheres at their ends, so
+    /// that the wall of a piece that widens outwards goes on to the plane of its end.
+    pub(super) fn rim(&self, number: u32) -> Option<Rim> {
+        if self.ends == TubeEnds::Round {
+            return None;
+        }
+        // Centre, direction and radius at the end, and the component of the wall's normal along the direction
+        let (centre, outward, radius, tilt) = match (&self.line, number) {
+            (CentreLine::Straight(cones), 0) => {
+                let cone = cones.first()?;
+                (cone.ends()[0], -cone.axis(), cone.radii()[0], (-cone.tilt()).max(0.0))
+            }
+            (CentreLine::Straight(cones), 1) => {
+                let cone = cones.last()?;
+                (cone.ends()[1], cone.axis(), cone.radii()[1], cone.tilt().max(0.0))
+            }
+            (CentreLine::Smooth(pieces), 0 | 1) => {
+                let (piece, u) = if number == 0 { (pieces.first()?, 0.0) } else { (pieces.last()?, 1.0) };
+                let Section { place: [c, c1, _], radius: [radius, r1, _] } = piece.at(u);
+                let (sign, speed) = (2.0 * u - 1.0, c1.norm());
+                (c, c1 * (sign / speed), radius, -sign * r1 / speed)
+            }
+            (CentreLine::Straight(_) | CentreLine::Smooth(_), _) => return None,
+        };
+        let across = (1.0 - tilt * tilt).sqrt();
+        Some(Rim { centre: centre + outward * (radius * tilt), outward, radius: radius * across })
     }
 
     /// The distance from the tube, outside of it.
