@@ -1,8 +1,10 @@
 //! Warnings and the stability of static stages as data: their names, run.json, and what decks expect of them.
 
 use super::folder::{Folder, last_line, status};
-use crate::scenes::{simulate, warnings};
-use beamsim_core::run::{StabilityVerdict, StageStability};
+use crate::random::Random;
+use crate::scenes::{attempt, list, simulate, warnings};
+use beamsim_core::run::{Failure, StabilityVerdict, StageStability};
+use beamsim_core::tensor::Vec3;
 use beamsim_core::warning::WarningKind;
 use serde_json::Value;
 use std::fs;
@@ -273,5 +275,77 @@ fn beams_too_stiff_to_compute_are_told() {
         for key in ["EA", "GA"] {
             assert!(!told(5e12, key) && told(2e13, key), "{length} {key}");
         }
+    }
+}
+
+/// Bodies that motors or springs of joints hold, in random directions: no stress is in them, and none is needed.
+#[test]
+fn joints_hold_bodies_in_later_stages() {
+    let mut random = Random::new(94);
+    let held = [
+        "kind = \"revolute\"\nangle = 1",
+        "kind = \"prismatic\"\nstiffness = 10",
+        "kind = \"revolute\"\nstiffness = 3",
+    ];
+    for case in 0..30 {
+        let [axis, aside] = random.axes();
+        let place = random.cube(1.0);
+        let deck = format!(
+            "[point]\nA = {}\n[[body]]\nat = \"A\"\nmass = 2\ninertia = [0.1, 0.2, 0.25]\n[[joint]]\nnodes = [\"A\"]\nat = {}\n\
+             axis = {}\n{}\n[[load]]\nat = \"A\"\nforce = {}\n{STATIC}{STATIC}",
+            list(place + aside * 0.5),
+            list(place),
+            list(axis),
+            held[case % 3],
+            list(random.cube(0.1))
+        );
+        let told: Vec<_> = simulate(&deck).counters.findings.warnings.iter().map(|warning| warning.kind).collect();
+        assert!(!told.contains(&WarningKind::HeldByStress), "{case}: {told:?}\n{deck}");
+    }
+}
+
+/// A pendulum on a hinge comes to rest under its weight, about any axis.
+#[test]
+fn weights_hold_pendulums() {
+    let mut random = Random::new(96);
+    let units = Vec3::UNIT;
+    for case in 0..20 {
+        let [down, axis] = if case < 6 { [-units[case % 3], units[(case + 1 + case / 3) % 3]] } else { random.axes() };
+        let away = if case % 2 == 0 { Vec3::ZERO } else { down.cross(axis) * random.range(-0.4, 0.4) };
+        let deck = format!(
+            "gravity = {}\n[point]\nA = {}\n[[body]]\nat = \"A\"\nmass = 1\ninertia = [0.1, 0.2, 0.25]\n\
+             [[joint]]\nkind = \"revolute\"\nnodes = [\"A\"]\nat = [0, 0, 0]\naxis = {}\n{STATIC}{STATIC}\
+             [output]\nnodes = [\"A\"]\ncolumns = [\"x\"]\n",
+            list(down * 10.0),
+            list(down * 0.5 + away),
+            list(axis)
+        );
+        let simulation = simulate(&deck);
+        let exact = down * (0.25 + away.squared()).sqrt();
+        assert!((Vec3(simulation.vector("A.")) - exact).norm() < 1e-6, "{case}: {deck}");
+        let told: Vec<_> = simulation.counters.findings.warnings.iter().map(|warning| warning.kind).collect();
+        assert!(told.contains(&WarningKind::CameToRest), "{case}: {told:?}");
+    }
+}
+
+/// A body on a ball joint comes to rest below it and may still turn about the vertical, which is named, however it has
+/// turned on its way.
+#[test]
+fn free_rotations_are_named_about_their_axis_in_space() {
+    let mut random = Random::new(95);
+    for case in 0..20 {
+        let [down, aside] = random.axes();
+        let angle = random.range(0.3, 2.8);
+        let deck = format!(
+            "gravity = {}\n[point]\nB = {}\n[[body]]\nat = \"B\"\nmass = 1\ninertia = [0.1, 0.2, 0.25]\n\
+             [[joint]]\nkind = \"spherical\"\nnodes = [\"B\"]\nat = [0, 0, 0]\n[[stage]]\nkind = \"static\"\nsteps = 1\n",
+            list(down * 10.0),
+            list((down * angle.cos() + aside * angle.sin()) * 0.5)
+        );
+        let failure = attempt(&deck).result.expect_err(&deck);
+        let Failure::Singular { place: Some(place), .. } = failure else { panic!("{failure}") };
+        let along = place.direction.dot(down).abs();
+        println!("{case}: {along}");
+        assert!(along > 0.999, "{case}: {place}, down {down:?}");
     }
 }

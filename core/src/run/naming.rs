@@ -3,9 +3,9 @@
 use super::failure::{Attempts, Failure, Place};
 use super::refusal::{refusal, refusal_help};
 use super::stage_run::StageRun;
-use crate::model::{Model, StageError};
+use crate::model::{Model, SlotKind, StageError};
 use crate::solve::{NewtonFailure, NullVector};
-use crate::system::System;
+use crate::system::{Slot, System};
 use crate::tensor::Vec3;
 
 /// Why a stage (from 0) cannot begin, with what helps.
@@ -60,10 +60,18 @@ impl StageRun<'_> {
         Failure::Singular { at, place: vector.map(|vector| self.place_of(&vector, system)) }
     }
 
-    /// Where a motion moves most.
+    /// Where a motion moves most, in spatial axes: increments of a rotation vector turn about R T dP.
     pub fn place_of(&self, vector: &NullVector, system: &System) -> Place {
         let (largest, motion) = vector.by_slot(&system.pattern.dof_map, self.model.slots());
-        Place::of(self.model, largest, motion[largest])
+        let moved = motion[largest];
+        let direction = match self.model.kinds[largest] {
+            SlotKind::Rotation => {
+                let rotation = self.state.rotation(largest as Slot);
+                rotation.r * (rotation.t * moved)
+            }
+            SlotKind::Displacement | SlotKind::Force | SlotKind::Moment | SlotKind::Sliding => moved,
+        };
+        Place::of(self.model, largest, direction)
     }
 
     /// Why the stage cannot go on.

@@ -4,7 +4,9 @@ use super::convergence::size;
 use super::linear::LinearSolver;
 use super::softest::NullVector;
 use super::tangent::Tangent;
-use crate::model::Model;
+use crate::model::{Model, SlotKind};
+use crate::system::Slot;
+use crate::tensor::Vec3;
 
 /// The softest motion of a tangent, with its strain.
 pub struct SoftMode {
@@ -14,6 +16,8 @@ pub struct SoftMode {
     strains: bool,
     /// True if the motion moves nodes most, not the multiplier of a joint
     moves: bool,
+    /// True if the motion opens joints; known where strain was computed and is none
+    opens: bool,
 }
 
 /// Strain relative to the size of a motion, below which it is a rigid motion. Motions with
@@ -31,7 +35,7 @@ impl SoftMode {
         let assembly = tangent.assembly();
         let state = tangent.state();
         if vector.held && !stress {
-            return Some(Self { vector, strains: true, moves: true });
+            return Some(Self { vector, strains: true, moves: true, opens: false });
         }
         let (largest, motion) = vector.by_slot(&assembly.system.pattern.dof_map, state.q.len());
         // The largest component may be the multiplier of a redundant constraint, which causes no
@@ -39,13 +43,34 @@ impl SoftMode {
         let moves = !model.kinds[largest].is_multiplier();
         let size = if moves { size(model, &motion) } else { 0.0 };
         let strains = size > 0.0 && assembly.strain_of(state, &motion, model.length) > RIGID_STRAIN_RATIO * size;
-        Some(Self { vector, strains, moves })
+        let mut found = Self { vector, strains, moves, opens: false };
+        found.opens = moves && !strains && found.opens_joints(tangent, model);
+        Some(found)
     }
 
-    /// True if the motion has neither stiffness nor strain. Very slender beams on fine meshes bend
+    /// True if the motion opens joints: their multipliers hold it. Gaps that are lengths count by their part of
+    /// the length of the scene.
+    pub fn opens_joints(&self, tangent: &mut Tangent, model: &Model) -> bool {
+        if model.multipliers.is_empty() {
+            return false;
+        }
+        let system = tangent.look();
+        let dof_map = &system.pattern.dof_map;
+        let (_, motion) = self.vector.by_slot(dof_map, model.slots());
+        let mut rows = vec![Vec3::ZERO; model.slots()];
+        dof_map.scatter(&system.multiply(&system.values, &self.vector.motion), None, &mut rows);
+        let opening = |&slot: &Slot| {
+            let arm = if model.kinds[slot as usize] == SlotKind::Force { model.length } else { 1.0 };
+            rows[slot as usize].norm() / arm
+        };
+        let widest = model.multipliers.iter().map(opening).fold(0.0, f64::max);
+        widest > RIGID_STRAIN_RATIO * size(model, &motion)
+    }
+
+    /// True if the motion has neither stiffness nor strain, nor opens joints. Very slender beams on fine meshes bend
     /// so softly that their stiffness is lost in round-off, but they strain.
     pub fn is_loose(&self) -> bool {
-        !self.vector.held && !self.strains
+        !self.vector.held && !self.strains && !self.opens
     }
 
     /// True if the stiffness against the motion is lost in round-off, although it causes strain.
@@ -56,7 +81,7 @@ impl SoftMode {
     /// True if only stress gives the motion stiffness, as gravity does to a pendulum. Meaningful
     /// only if strain was asked for with `stress`.
     pub fn is_held_by_stress(&self) -> bool {
-        self.vector.held && self.moves && !self.strains
+        self.vector.held && self.moves && !self.strains && !self.opens
     }
 }
 

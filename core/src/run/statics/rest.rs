@@ -344,5 +344,6 @@ fn loose_at_rest(
     };
     let moves = LOOSE * force / model.length * largest(SlotKind::Displacement);
     let turns = LOOSE_TURN * force * model.length * largest(SlotKind::Rotation);
-    (soft_mode.is_loose() || stiffness.abs() < moves.max(turns)).then_some(soft_mode.vector)
+    let mut is_soft = || stiffness.abs() < moves.max(turns) && !soft_mode.opens_joints(&mut tangent, model);
+    (soft_mode.is_loose() || is_soft()).then_some(soft_mode.vector)
 }
