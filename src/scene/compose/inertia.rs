@@ -20,6 +20,9 @@ use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+/// Why no effect has the masses of beams along their elements, where nodes have them.
+const ALL_LUMPED: &str = "all masses of beams are eccentric and lumped at the nodes";
+
 impl Composer<'_> {
     /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section
     /// has it.
@@ -50,8 +53,9 @@ impl Composer<'_> {
         eccentric.shrink_to_fit();
         let rotary = RotaryInertia { elements: rotary, gyroscopic };
         let eccentric = SectionInertia { elements: eccentric, gyroscopic };
+        let is_lumped = !bodies.is_empty();
         if mass.is_empty() {
-            self.reason(names[0], false, "no section has mass on its centre line");
+            self.reason(names[0], false, if is_lumped { ALL_LUMPED } else { "no section has mass on its centre line" });
         } else {
             self.push(mass, "sections have `rhoA`, and stages or columns need mass".into());
         }
@@ -80,7 +84,11 @@ impl Composer<'_> {
             );
         }
         if eccentric.elements.is_empty() {
-            self.reason(names[2], false, "no section has its mass centre off the centre line");
+            let why = match is_lumped {
+                true => "the mass of relative beams with rotary inertia or eccentric mass is lumped at the nodes",
+                false => "no section has its mass centre off the centre line",
+            };
+            self.reason(names[2], false, why);
         } else {
             self.push(eccentric, "sections with an eccentric `mass`".into());
         }
@@ -247,7 +255,7 @@ impl Composer<'_> {
             let (elements, nodal) = self.inertia_elements(|_, _, inertia| inertia);
             bodies.extend(nodal.into_iter().filter(|body| body.inertia.mass > 0.0));
             if elements.is_empty() {
-                self.reason("gravity on beams", false, "all masses of beams are eccentric and lumped at the nodes");
+                self.reason("gravity on beams", false, ALL_LUMPED);
             } else {
                 self.push(BeamGravity { acceleration, amplitude, elements }, "`gravity` is set".into());
             }
@@ -275,7 +283,7 @@ impl Composer<'_> {
         }
         let (elements, nodal) = self.inertia_elements(|_, _, inertia| inertia);
         if elements.is_empty() {
-            self.reason(names[0], false, "no beams with mass");
+            self.reason(names[0], false, if nodal.is_empty() { "no beams with mass" } else { ALL_LUMPED });
         } else {
             self.push(BeamMassDamping { factor: mass, elements }, "`mass` in [damping]".into());
         }

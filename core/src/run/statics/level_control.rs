@@ -18,7 +18,7 @@ use crate::solve::{NewtonFailure, Signature};
 use crate::warning::WarningKind;
 
 /// The words about a stage that took over much from a motion.
-const IN_MOTION: &str = "(the stage started from a moving state, whose inertia forces are ramped down: `[damping]` in the previous dynamic \
+const IN_MOTION: &str = " (the stage started from a moving state, whose inertia forces are ramped down: `[damping]` in the previous dynamic \
      stage makes them smaller)";
 
 /// The part of a level up to which a step may be long in which a point with friction comes into
