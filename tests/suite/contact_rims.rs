@@ -170,3 +170,37 @@ fn wires_slide_out_of_tubes_without_a_loss() {
         assert!(push[4..].iter().all(|&push| push < -0.04), "{case}: {push:?}");
     }
 }
+
+/// Balls that a force pushes against the rim of a tube, from its mouth and from beside its end: their middle is a radius
+/// away from the circle.
+#[test]
+fn balls_rest_on_rims() {
+    let ball = |side: &str, place: [f64; 3], free: &str, force: [f64; 3]| {
+        let fixed: Vec<String> = ["ux", "uy", "uz", "rx", "ry", "rz"]
+            .iter()
+            .filter(|name| **name != free)
+            .map(|name| format!("\"{name}\""))
+            .collect();
+        let spring = ["ux", "uy", "uz", "rx", "ry", "rz"].map(|name| if name == free { 10.0 } else { 0.0 });
+        let deck = format!(
+            "[point]\nb = {place:?}\n[[body]]\nat = \"b\"\nmass = 1\n[[support]]\nat = \"b\"\nfix = [{}]\n\
+             [[spring]]\nat = \"b\"\nstiffness = {spring:?}\n[[load]]\nat = \"b\"\nforce = {force:?}\n\
+             [[surface]]\nname = \"t\"\nkind = \"tube\"\nside = \"{side}\"\nthrough = [[-1, 0, 0], [0, 0, 0]]\nradius = 0.02\n\
+             [[contact]]\nname = \"c\"\nnodes = [\"b\"]\nsurfaces = [\"t\"]\nradius = 0.03\nstiffness = 1e4\npenetration = 1e-7\n\
+             [[stage]]\nkind = \"static\"\nsteps = 20\n[output]\nnodes = [\"b\"]\ncolumns = [\"x\", \"contact\"]\n",
+            fixed.join(", ")
+        );
+        let simulation = simulate(&deck);
+        (Vec3(simulation.vector("b.")), simulation.end("c.normal"))
+    };
+    let (place, normal) = ball("inside", [0.04, 0.005, 0.0], "ux", [-1.0, 0.0, 0.0]);
+    let exact = (0.03_f64.powi(2) - 0.015_f64.powi(2)).sqrt();
+    assert!((place.0[0] - exact).abs() < 1e-6, "{place:?} {exact}");
+    let push = 1.0 - 10.0 * (0.04 - exact);
+    assert!((normal - push * 0.03 / exact).abs() < 1e-3 * normal, "{normal}");
+    let (place, normal) = ball("outside", [0.01, 0.0, 0.06], "uz", [0.0, 0.0, -1.0]);
+    let exact = (0.03_f64.powi(2) - 0.01_f64.powi(2)).sqrt();
+    assert!((place.0[2] - 0.02 - exact).abs() < 1e-6, "{place:?} {exact}");
+    let push = 1.0 - 10.0 * (0.06 - 0.02 - exact);
+    assert!((normal - push * 0.03 / exact).abs() < 1e-3 * normal, "{normal}");
+}

@@ -3,6 +3,9 @@
 use crate::system::{Slot, State};
 use crate::tensor::Vec3;
 
+/// Penetrations beyond this multiple of the allowed one are warned of: what rests penetrates by exactly one.
+pub const TOLD_PENETRATION: f64 = 1.01;
+
 /// The role of contacts, whose memory is [`State::contacts`].
 pub trait Contacts {
     /// True if some contact has friction.

@@ -19,7 +19,9 @@ pub mod spring;
 mod volume;
 
 pub use batch::{ByOrder, Connection};
-pub use contact_role::{ContactChange, ContactResultant, ContactSurvey, Contacts, ElasticStick, Missed, Penetration};
+pub use contact_role::{
+    ContactChange, ContactResultant, ContactSurvey, Contacts, ElasticStick, Missed, Penetration, TOLD_PENETRATION,
+};
 pub use volume::{VolumeElement, VolumeElements};
 
 use crate::kernel::Weights;

@@ -42,6 +42,8 @@ pub struct Newton {
     /// A solution ends without a result where corrections contract by more than this: a step that
     /// would be refused costs no more of them. Infinite unless a caller sets it.
     pub(crate) largest_contraction: f64,
+    /// True if the last solution has ended so
+    has_ended_early: bool,
     /// True if a correction of the last solution was shortened, so that centre lines of beams do not
     /// cross
     pub(crate) was_shortened: bool,
@@ -94,6 +96,7 @@ impl Newton {
             first: CompressedField::default(),
             contraction: 0.0,
             largest_contraction: f64::INFINITY,
+            has_ended_early: false,
             was_shortened: false,
             is_short: false,
             reuse: Reuse::new(),
@@ -351,7 +354,11 @@ impl Solution<'_> {
             return Err(self.not_converged(residual));
         }
         if contraction(self.newton.last, length) > self.newton.largest_contraction {
-            return Err(NewtonFailure::NotConverged { residual, history: self.newton.reuse.history.clone() });
+            // Where a shorter step ends so, too, lost digits may be the reason.
+            return Err(match std::mem::replace(&mut self.newton.has_ended_early, true) {
+                true => self.not_converged(residual),
+                false => NewtonFailure::NotConverged { residual, history: self.newton.reuse.history.clone() },
+            });
         }
         Ok(length)
     }
@@ -400,7 +407,8 @@ impl Solution<'_> {
 
     /// Called when a solution is found.
     fn end(&mut self) {
-        let Newton { time_error, solver, dq, reuse, .. } = &mut *self.newton;
+        let Newton { time_error, solver, dq, reuse, has_ended_early, .. } = &mut *self.newton;
+        *has_ended_early = false;
         if let Some(time_error) = time_error {
             let mut correct = |system: &System, dq: &mut [Vec3]| {
                 solver.has_factorised(system) && solver.correct(system, false, None, dq)

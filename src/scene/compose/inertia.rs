@@ -53,9 +53,13 @@ impl Composer<'_> {
         eccentric.shrink_to_fit();
         let rotary = RotaryInertia { elements: rotary, gyroscopic };
         let eccentric = SectionInertia { elements: eccentric, gyroscopic };
-        let is_lumped = !bodies.is_empty();
+        let has_lumped_mass = bodies.iter().any(|body| body.inertia.mass > 0.0);
         if mass.is_empty() {
-            self.reason(names[0], false, if is_lumped { ALL_LUMPED } else { "no section has mass on its centre line" });
+            self.reason(
+                names[0],
+                false,
+                if has_lumped_mass { ALL_LUMPED } else { "no section has mass on its centre line" },
+            );
         } else {
             self.push(mass, "sections have `rhoA`, and stages or columns need mass".into());
         }
@@ -84,8 +88,8 @@ impl Composer<'_> {
             );
         }
         if eccentric.elements.is_empty() {
-            let why = match is_lumped {
-                true => "the mass of relative beams with rotary inertia or eccentric mass is lumped at the nodes",
+            let why = match has_lumped_mass {
+                true => "eccentric masses of relative beams are lumped at the nodes",
                 false => "no section has its mass centre off the centre line",
             };
             self.reason(names[2], false, why);

@@ -1,8 +1,9 @@
 //! A beam or a body against one surface: its nodes, and its candidates for contact.
 //!
 //! The candidates of a state are the closest points between the ends of elements
-//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. At boxes and meshes the
-//! closest points to edges are candidates as well ([`crate::kernel::contact::edge`]). Elements from
+//! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. At boxes, meshes and the
+//! rims of open tubes the closest points to edges are candidates as well
+//! ([`crate::kernel::contact::edge`]). Elements from
 //! which the surface is farther than they reach have none: the distance changes by no more than a
 //! point moves.
 //!
@@ -14,7 +15,9 @@ use super::strand::{ChainNode, Strand};
 use super::surface::SceneSurface;
 use crate::kernel::MAX_NODES;
 use crate::kernel::contact::along::{minima_on, place_and_slope, place_on};
-use crate::kernel::contact::{Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface};
+use crate::kernel::contact::{
+    Carrier, Distance, Minima, Minimum, MinimumKind, Place, ShapeAt, Side, Surface, Undefined,
+};
 use crate::system::{ChainMemory, Clearance, ContactRegime, PointMemory, State};
 use crate::tensor::Vec3;
 use std::ops::Deref;
@@ -71,7 +74,7 @@ pub(super) struct Candidate {
     pub(super) s: f64,
     /// At a node, or at the closest point
     pub(super) place: Place,
-    /// The number of the edge of a box or a mesh that it may touch; otherwise it may touch the whole
+    /// The number of the edge of a box or a mesh, or of the rim of a tube, that it may touch; otherwise it may touch the whole
     /// surface
     pub(super) edge: Option<u32>,
     /// The part of the force that it carries
@@ -130,7 +133,8 @@ impl Chain {
                 let of_edge = candidate.distance(surface, place).map_or(f64::INFINITY, |it| it.value - self.radius);
                 of_edge.min(gap(place))
             };
-            seen.closest_to_edges(k).into_iter().map(gap).fold(f64::INFINITY, f64::min)
+            let at_edges = if self.order == 0 { Vec::from_iter(seen.rim_of_body()) } else { seen.closest_to_edges(k) };
+            at_edges.into_iter().map(gap).fold(f64::INFINITY, f64::min)
         };
         let of_surface = |k: usize| {
             let minima = seen.minima(k);
@@ -389,7 +393,7 @@ impl SeenChain<'_> {
     /// section pushes it out, too, from the place where it is.
     fn add_minima(&self, k: usize, candidates: &mut Vec<Candidate>) {
         if self.chain.order == 0 {
-            candidates.extend(self.closest_to_edges(k));
+            candidates.extend(self.rim_of_body());
             return;
         }
         let distance = |y: Vec3| self.surface.distance(y).ok();
@@ -432,20 +436,27 @@ impl SeenChain<'_> {
         edges
     }
 
+    /// The node of a body at the rims of a tube, beyond its ends. Elsewhere, and at edges and corners of other
+    /// surfaces, it touches by its distance from the whole surface.
+    fn rim_of_body(&self) -> Option<Candidate> {
+        if self.surface.is_faceted() {
+            return None;
+        }
+        let Err(Undefined::BeyondEnd) = self.surface.distance(self.places[0]) else { return None };
+        let distance = |&number: &u32| {
+            let edge = self.surface.edge(number).filter(|edge| edge.is_beside(self.places[0]));
+            edge.and_then(|edge| edge.distance(self.places[0]).ok()).map_or(f64::INFINITY, |it| it.value)
+        };
+        let nearest = self.edges_of(0).into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        Some(Candidate { element: 0, s: 0.0, place: Place::Fixed, edge: Some(nearest), weight: 1.0 })
+    }
+
     /// The points of element `k` that are closest to an edge, with its first node, and its last one at
     /// the end of the chain. Nodes keep their own contact, since they may touch a face.
     fn closest_to_edges(&self, k: usize) -> Vec<Candidate> {
         let mut found = Vec::new();
         for number in self.edges_of(k) {
             let Some(edge) = self.surface.edge(number) else { continue };
-            if self.chain.order == 0 {
-                // The node of a body touches edges and corners by its distance from the whole surface, which has
-                // none beyond a rim.
-                let is_beyond = self.surface.distance(self.places[k]).is_err() && edge.is_beside(self.places[k]);
-                let at = Candidate { element: k, s: 0.0, place: Place::Fixed, edge: Some(number), weight: 1.0 };
-                found.extend(is_beyond.then_some(at));
-                continue;
-            }
             let is_beside = |s: f64| {
                 let place = self.place(k, s);
                 edge.is_beside(place) && self.surface.owns_corner(number, place)

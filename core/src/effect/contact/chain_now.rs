@@ -166,7 +166,7 @@ impl<'a> ChainNow<'a> {
     }
 
     /// A slot of a candidate inside of the surface where that has no normal.
-    pub(super) fn lost(&self) -> Option<Slot> {
+    pub(super) fn without_normal(&self) -> Option<Slot> {
         let is_lost = |candidate: &&Candidate| {
             let seen = self.carrier.on_surface(self.place(candidate));
             candidate.edge.is_none() && self.surface.surface.is_lost(seen, self.chain.radius)

@@ -10,9 +10,6 @@ pub(super) const TOUCHING: f64 = 1e-4;
 /// The gap of a point whose force may be round-off, over the largest penetration.
 const BARELY_TOUCHING: f64 = 1e-8;
 
-/// Penetrations that are told exceed the allowed one by this factor.
-pub(super) const ROUNDED: f64 = 1.01;
-
 /// Forces below this part of the largest need no small gap.
 pub(super) const RELEVANT_FORCE: f64 = 1e-6;
 

@@ -26,7 +26,7 @@ pub use surface::{SceneSurface, SurfaceCarrier};
 
 use super::{
     ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, ElasticStick, Missed,
-    Penetration, Roles, TangentForm,
+    Penetration, Roles, TOLD_PENETRATION, TangentForm,
 };
 use crate::kernel::Weights;
 use crate::kernel::contact::Status;
@@ -37,7 +37,7 @@ use crate::system::{
 use crate::tensor::Vec3;
 use chain_now::{ChainNow, before_of};
 use late_touch::{LateTouch, PointFriction};
-use laws::{RELEVANT_FORCE, ROUNDED};
+use laws::RELEVANT_FORCE;
 use pairs::PairRole;
 use std::sync::Arc;
 
@@ -245,12 +245,12 @@ impl SurfaceContacts {
         let is_penalty = at.contacts.regime == ContactRegime::Penalty;
         let may_sink = |chain: &Chain| is_penalty && self.surfaces[chain.surface].depth().is_finite();
         let may_stray = |chain: &Chain| may_sink(chain) || self.laws[chain.contact].rubs();
-        let has_axis = |chain: &Chain| self.surfaces[chain.surface].depth().is_finite();
+        let may_lose = |chain: &Chain| self.surfaces[chain.surface].surface.may_lose_points();
         let mut strayed = None;
-        let looked_at = |chain: &Chain| has_axis(chain) || may_stray(chain);
+        let looked_at = |chain: &Chain| may_lose(chain) || may_stray(chain);
         for number in (0..self.chains.len()).filter(|&k| looked_at(&self.chains[k]) && self.is_near(k, at)) {
             let chain = self.chain_now(number, at, Weights::NONE);
-            if let Some(slot) = chain.lost() {
+            if let Some(slot) = chain.without_normal() {
                 return Some(slot);
             }
             if !may_stray(chain.chain) {
@@ -633,7 +633,7 @@ impl Contacts for SurfaceContacts {
         for (chain, laws, surface) in self.acting(at) {
             let depth = -chain.least_gap(&surface.surface, &surface.carrier(at, Weights::NONE), at);
             let is_deepest = deepest.as_ref().is_none_or(|deepest| depth > deepest.depth);
-            if depth > ROUNDED * laws.penetration && is_deepest {
+            if depth > TOLD_PENETRATION * laws.penetration && is_deepest {
                 let slot = chain.nodes[chain.nodes.len() / 2].node.u;
                 deepest = Some(Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth });
             }

@@ -55,7 +55,7 @@ impl Surface {
     /// True if closest points to edges are contact points of their own.
     pub fn has_edges(&self) -> bool {
         match &self.shape {
-            Shape::Tube(tube) => tube.rim(0).is_some(),
+            Shape::Tube(tube) => tube.rims().is_some(),
             Shape::Plane { .. }
             | Shape::Sphere { .. }
             | Shape::Cylinder { .. }
@@ -119,9 +119,11 @@ impl Surface {
             Shape::Box { .. } if self.side == Side::Outside => (0..EDGES).collect(),
             Shape::Tube(tube) => {
                 let (middle, half) = ((line[0] + line[1]) * 0.5, 0.5 * (line[1] - line[0]).norm());
-                (0..2)
-                    .filter(|&number| tube.rim(number).is_some_and(|rim| rim.is_within(half + reach, middle)))
-                    .collect()
+                let is_near = |number: &u32| {
+                    let rim = tube.rims().map(|rims| rims[*number as usize]);
+                    rim.is_some_and(|rim| rim.is_within(half + reach, middle))
+                };
+                (0..2).filter(is_near).collect()
             }
             Shape::Box { .. }
             | Shape::Plane { .. }
@@ -136,7 +138,7 @@ impl Surface {
     pub fn edge(&self, number: u32) -> Option<Edge> {
         match &self.shape {
             Shape::Box { centre, axes, half } => Some(Edge::Straight(edge_of_box(*centre, axes, *half, number))),
-            Shape::Tube(tube) => Some(Edge::Rim(tube.rim(number)?, self.side)),
+            Shape::Tube(tube) => Some(Edge::Rim(*tube.rims()?.get(number as usize)?, self.side)),
             Shape::Mesh(mesh) => {
                 let (middle, along, half, outward) = mesh.edge(number)?;
                 let normals = match self.side {
@@ -191,13 +193,13 @@ impl Edge {
         }
     }
 
-    /// True if the point `y` is outside of the faces of the edge, and nearer to this edge than to
-    /// those on the other sides of its faces.
+    /// True if the point `y` is outside of the faces of the edge, or the wall of a tube, and nearer to this edge than
+    /// to those on the other sides of its faces.
     pub fn is_beside(&self, y: Vec3) -> bool {
         match self {
             Self::Straight(edge) => edge.is_beside(y),
             Self::Rim(rim, side) => {
-                let [beyond, across] = rim.sees(y);
+                let [beyond, across] = rim.along_and_across(y);
                 let is_off_the_wall = match side {
                     Side::Inside => across < rim.radius,
                     Side::Outside => across > rim.radius,

@@ -148,6 +148,17 @@ impl Surface {
         }
     }
 
+    /// True if points inside of a body may have no normal: on an axis, at a centre.
+    pub fn may_lose_points(&self) -> bool {
+        let has_axis = match &self.shape {
+            Shape::Sphere { .. } | Shape::Cylinder { .. } | Shape::Cone(_) | Shape::Torus { .. } | Shape::Tube(_) => {
+                true
+            }
+            Shape::Plane { .. } | Shape::Box { .. } | Shape::Mesh(_) => false,
+        };
+        has_axis && self.side == Side::Outside
+    }
+
     /// True for a point inside of a body at which it has no normal: no force pushes it out. `size`: see
     /// [`Surface::value`].
     pub fn is_lost(&self, y: Vec3, size: f64) -> bool {

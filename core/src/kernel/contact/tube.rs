@@ -56,6 +56,8 @@ pub enum TubeError {
 pub struct Tube {
     line: CentreLine,
     ends: TubeEnds,
+    /// At the first and the last end, where those are open
+    rims: Option<[Rim; 2]>,
     least_radius: f64,
 }
 
@@ -69,8 +71,14 @@ pub struct Rim {
 }
 
 impl Rim {
+    /// The rim of a wall around an end of a centre line, of a radius there. `tilt`: the component along `outward`
+    /// of the wall's normal.
+    fn of_end(end: Vec3, outward: Vec3, radius: f64, tilt: f64) -> Self {
+        Self { centre: end + outward * (radius * tilt), outward, radius: radius * (1.0 - tilt * tilt).sqrt() }
+    }
+
     /// How far a point is beyond the plane of the rim, and from its axis.
-    pub(super) fn sees(&self, y: Vec3) -> [f64; 2] {
+    pub(super) fn along_and_across(&self, y: Vec3) -> [f64; 2] {
         let d = y - self.centre;
         let beyond = self.outward.dot(d);
         [beyond, (d - self.outward * beyond).norm()]
@@ -78,7 +86,7 @@ impl Rim {
 
     /// True if a point is no farther than `reach` from the circle.
     pub(super) fn is_within(&self, reach: f64, y: Vec3) -> bool {
-        let [beyond, across] = self.sees(y);
+        let [beyond, across] = self.along_and_across(y);
         beyond.hypot(across - self.radius) <= reach
     }
 }
@@ -169,6 +177,31 @@ struct Closest {
     value: f64,
 }
 
+impl CentreLine {
+    /// The rims of open ends. The wall ends where its closest point is that of the centre line's end. Straight
+    /// pieces have spheres at their ends, so that the wall of a piece that widens outwards goes on to the
+    /// plane of its end.
+    fn rims(&self) -> Option<[Rim; 2]> {
+        Some(match self {
+            Self::Straight(cones) => {
+                let (first, last) = (cones.first()?, cones.last()?);
+                [
+                    Rim::of_end(first.ends()[0], -first.axis(), first.radii()[0], (-first.tilt()).max(0.0)),
+                    Rim::of_end(last.ends()[1], last.axis(), last.radii()[1], last.tilt().max(0.0)),
+                ]
+            }
+            Self::Smooth(pieces) => {
+                let of_end = |piece: &Piece, u: f64| {
+                    let Section { place: [c, c1, _], radius: [radius, r1, _] } = piece.at(u);
+                    let outward = c1 * ((2.0 * u - 1.0) / c1.norm());
+                    Rim::of_end(c, outward, radius, -r1 * (2.0 * u - 1.0) / c1.norm())
+                };
+                [of_end(pieces.first()?, 0.0), of_end(pieces.last()?, 1.0)]
+            }
+        })
+    }
+}
+
 impl Tube {
     /// The tube with straight pieces between `points`.
     pub fn straight(points: &[Vec3], radii: &[f64], ends: TubeEnds) -> Result<Self, TubeError> {
@@ -176,7 +209,7 @@ impl Tube {
         let piece = |k: usize| Cone::new(points[k], points[k + 1], [radii[k], radii[k + 1]]).ok_or(TubeError::Steep(k));
         let cones: Result<Vec<Cone>, TubeError> = (0..points.len() - 1).map(piece).collect();
         let least_radius = radii.iter().copied().fold(f64::INFINITY, f64::min);
-        Ok(Self { line: CentreLine::Straight(cones?), ends, least_radius })
+        Ok(Self::of(CentreLine::Straight(cones?), ends, least_radius))
     }
 
     /// The tube along the natural cubic spline through `points`, over the length of the chords
@@ -200,7 +233,15 @@ impl Tube {
             least_radius = least_radius.min(piece.examine(k)?);
             pieces.push(piece);
         }
-        Ok(Self { line: CentreLine::Smooth(pieces), ends, least_radius })
+        Ok(Self::of(CentreLine::Smooth(pieces), ends, least_radius))
+    }
+
+    fn of(line: CentreLine, ends: TubeEnds, least_radius: f64) -> Self {
+        let rims = match ends {
+            TubeEnds::Open => line.rims(),
+            TubeEnds::Round => None,
+        };
+        Self { line, ends, rims, least_radius }
     }
 
     /// Places of the centre line with their radii, close enough to draw it.
@@ -227,33 +268,9 @@ impl Tube {
         self.least_radius
     }
 
-    /// The rim at the first end (0) or the last one (1); `None` where that is not open. The wall ends where its
-    /// closest point is that of the centre line's end. Straight pieces have spheres at their ends, so
-    /// that the wall of a piece that widens outwards goes on to the plane of its end.
-    pub(super) fn rim(&self, number: u32) -> Option<Rim> {
-        if self.ends == TubeEnds::Round {
-            return None;
-        }
-        // Centre, direction and radius at the end, and the component of the wall's normal along the direction
-        let (centre, outward, radius, tilt) = match (&self.line, number) {
-            (CentreLine::Straight(cones), 0) => {
-                let cone = cones.first()?;
-                (cone.ends()[0], -cone.axis(), cone.radii()[0], (-cone.tilt()).max(0.0))
-            }
-            (CentreLine::Straight(cones), 1) => {
-                let cone = cones.last()?;
-                (cone.ends()[1], cone.axis(), cone.radii()[1], cone.tilt().max(0.0))
-            }
-            (CentreLine::Smooth(pieces), 0 | 1) => {
-                let (piece, u) = if number == 0 { (pieces.first()?, 0.0) } else { (pieces.last()?, 1.0) };
-                let Section { place: [c, c1, _], radius: [radius, r1, _] } = piece.at(u);
-                let (sign, speed) = (2.0 * u - 1.0, c1.norm());
-                (c, c1 * (sign / speed), radius, -sign * r1 / speed)
-            }
-            (CentreLine::Straight(_) | CentreLine::Smooth(_), _) => return None,
-        };
-        let across = (1.0 - tilt * tilt).sqrt();
-        Some(Rim { centre: centre + outward * (radius * tilt), outward, radius: radius * across })
+    /// The rims of its first and its last end, where those are open.
+    pub(super) fn rims(&self) -> Option<&[Rim; 2]> {
+        self.rims.as_ref()
     }
 
     /// The distance from the tube, outside of it.

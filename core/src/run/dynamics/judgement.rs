@@ -2,6 +2,7 @@
 //! error.
 
 use super::Dynamics;
+use crate::effect::TOLD_PENETRATION;
 use crate::integrate::{Largest, Rotations};
 use crate::run::energy::Imbalance;
 use crate::run::findings::StageTimeError;
@@ -27,8 +28,6 @@ const PROPOSED_ERROR: f64 = 0.4;
 const LEAST_PART_OF_STEP: f64 = 0.1;
 /// The part of an imbalance from which on one reason explains most of it.
 const OWN_PART: f64 = 0.5;
-/// The largest penetration that is not told, over the one that is wanted: what rests may penetrate by just that.
-const LARGEST_PENETRATION: f64 = 1.005;
 /// Steps that a contact should last: with ten the rebound is within 0.4 %.
 const LEAST_STEPS_OF_CONTACT: u32 = 9;
 
@@ -98,7 +97,7 @@ impl Dynamics<'_, '_> {
             );
             self.stage.warn(WarningKind::HiddenPenetration, message);
         }
-        if deepest > LARGEST_PENETRATION {
+        if deepest > TOLD_PENETRATION {
             // Penetrations of an impact fall with the root of the stiffness.
             let message = format!(
                 "stage {stage}: contacts penetrate by up to {} times `penetration`: a `stiffness` {} times as large, \

@@ -359,9 +359,9 @@ impl LevelControl<'_, '_> {
             self.stage.newton.begin_with(&self.stage.assembly.system);
         }
         self.touch = self.touch.filter(|&touch| touch > self.stage.good.load);
-        // What corrections do where points touch tells nothing.
+        // Contacts change between iterations, and round-off is no contraction.
         let touches = self.stage.state.contacts.touches() || self.stage.contact_change != ContactChange::None;
-        let contraction = if touches { 0.0 } else { self.stage.newton.contraction };
+        let contraction = if touches || self.stage.soft { 0.0 } else { self.stage.newton.contraction };
         self.levels.lengthen(contraction, self.stability.largest_contraction(signature));
         Ok(())
     }

@@ -76,7 +76,7 @@ impl Levels {
     /// stiffness of the softest motion.
     pub fn halve(&mut self, soft: bool) -> bool {
         let may = self.may_halve(soft);
-        self.increment = if may { 0.5 * self.increment } else { self.increment };
+        self.increment *= if may { 0.5 } else { 1.0 };
         may
     }
 

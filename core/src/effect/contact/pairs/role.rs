@@ -3,8 +3,9 @@
 use super::BeamPairs;
 use super::point::{PairPoint, PairsNow, sort};
 use crate::effect::contact::late_touch::{LateTouch, PointFriction};
-use crate::effect::contact::laws::{ContactLaws, RELEVANT_FORCE, ROUNDED};
+use crate::effect::contact::laws::{ContactLaws, RELEVANT_FORCE};
 use crate::effect::contact::strand::ContactStiffness;
+use crate::effect::contact_role::TOLD_PENETRATION;
 use crate::effect::{ContactChange, ContactResultant, ContactSurvey, Penetration};
 use crate::kernel::Weights;
 use crate::kernel::contact::Status;
@@ -218,7 +219,7 @@ impl<'a> PairRole<'a> {
 
     /// The deepest penetration, if it exceeds the allowed one by more than augmentations leave.
     pub fn hidden_penetration(self, at: &State) -> Option<Penetration> {
-        self.deepest(at, ROUNDED, &|_| true).map(|found| self.penetration_of(found))
+        self.deepest(at, TOLD_PENETRATION, &|_| true).map(|found| self.penetration_of(found))
     }
 
     /// A node of a pair whose centre lines may have crossed on the way.
