@@ -28,9 +28,9 @@ ROOT = Path(__file__).resolve().parents[1]
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 RECORD = ROOT / "benches" / "instructions.csv"
 ELEMENTS = 60
-# Steps of the short and of the long run, and of the long one where costs are compared to 0.1 %: a run's own instructions vary by some
-# 1,600, mostly with the digits of the seconds that it writes, which is 0.1 % of eight steps.
-FEW, MANY, MANY_TO_COMPARE = 2, 8, 32
+# Steps of the short run, so many that none is cut back, of the long run, and of the long one where costs are compared to 0.1 %: a run's own
+# instructions vary by some 1,600, mostly with the digits of the seconds that it writes, which is 0.1 % of eight steps.
+FEW, MANY, MANY_TO_COMPARE = 4, 8, 32
 # A compiler's whims, scenes that must cost the same, and contacts out of reach.
 TOLERANCE, SAME, NEARLY_SAME = 0.05, 1e-3, 1e-2
 # Instructions of a function in callgrind_annotate's list, and the functions of the allocator.
