@@ -39,10 +39,10 @@ pub struct Newton {
     /// Largest ratio of successive corrections of the last solution, above round-off; small if the
     /// iteration follows the path
     pub(crate) contraction: f64,
-    /// A solution ends without a result where corrections contract by more than this: a step that
-    /// would be refused costs no more of them. Infinite unless a caller sets it.
+    /// A solution ends without a result where a correction is larger than this part of the one before
+    /// it: a step that would be refused costs no more of them. Infinite unless a caller sets it
     pub(crate) largest_contraction: f64,
-    /// True if the last solution has ended so
+    /// True if the last solution was ended by `largest_contraction`
     has_ended_early: bool,
     /// True if a correction of the last solution was shortened, so that centre lines of beams do not
     /// cross

@@ -67,8 +67,8 @@ impl SoftMode {
         widest > RIGID_STRAIN_RATIO * size(model, &motion)
     }
 
-    /// True if the motion has neither stiffness nor strain, nor opens joints. Very slender beams on fine meshes bend
-    /// so softly that their stiffness is lost in round-off, but they strain.
+    /// True if the motion has neither stiffness nor strain, nor opens joints. Very slender beams on
+    /// fine meshes bend so softly that their stiffness is lost in round-off, but they strain.
     pub fn is_loose(&self) -> bool {
         !self.vector.held && !self.strains && !self.opens
     }

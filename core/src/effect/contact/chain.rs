@@ -3,9 +3,8 @@
 //! The candidates of a state are the closest points between the ends of elements
 //! ([`crate::kernel::contact::along`]), and all nodes that are not beside one. At boxes, meshes and the
 //! rims of open tubes the closest points to edges are candidates as well
-//! ([`crate::kernel::contact::edge`]). Elements from
-//! which the surface is farther than they reach have none: the distance changes by no more than a
-//! point moves.
+//! ([`crate::kernel::contact::edge`]). Elements from which the surface is farther than they reach have
+//! none: the distance changes by no more than a point moves.
 //!
 //! In dynamic stages closest points and the nodes beside them share the force, so that it does not
 //! jump where a closest point passes from one element to the next.
@@ -74,8 +73,8 @@ pub(super) struct Candidate {
     pub(super) s: f64,
     /// At a node, or at the closest point
     pub(super) place: Place,
-    /// The number of the edge of a box or a mesh, or of the rim of a tube, that it may touch; otherwise it may touch the whole
-    /// surface
+    /// The number of the edge of a box or a mesh, or of the rim of a tube, that it may touch; otherwise
+    /// it may touch the whole surface
     pub(super) edge: Option<u32>,
     /// The part of the force that it carries
     pub(super) weight: f64,
@@ -442,12 +441,13 @@ impl SeenChain<'_> {
         if self.surface.is_faceted() {
             return None;
         }
-        let Err(Undefined::BeyondEnd) = self.surface.distance(self.places[0]) else { return None };
-        let distance = |&number: &u32| {
-            let edge = self.surface.edge(number).filter(|edge| edge.is_beside(self.places[0]));
-            edge.and_then(|edge| edge.distance(self.places[0]).ok()).map_or(f64::INFINITY, |it| it.value)
-        };
-        let nearest = self.edges_of(0).into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        let place = self.places[0];
+        let Err(Undefined::BeyondEnd) = self.surface.distance(place) else { return None };
+        let beside = self.edges_of(0).into_iter().filter_map(|number| {
+            let edge = self.surface.edge(number).filter(|edge| edge.is_beside(place))?;
+            Some((edge.distance(place).ok()?.value, number))
+        });
+        let (_, nearest) = beside.min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(Candidate { element: 0, s: 0.0, place: Place::Fixed, edge: Some(nearest), weight: 1.0 })
     }
 

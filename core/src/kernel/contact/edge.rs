@@ -14,8 +14,8 @@
 //! larger. Of the edges that meet at a corner one touches what is nearest to the corner.
 //!
 //! A rim is the circle where the wall of a tube ends; its distance is that of a torus of no thickness
-//! ([`super::surface`]). A wire that crosses it at an angle is pushed across its own direction, not
-//! across that of the wall: so it does no work on a wire that slides out without friction.
+//! ([`super::surface`]). Its force on a wire is normal to the wire at the closest point, not to the
+//! wall: it does no work where the wire slides along itself.
 
 use super::along::intervals_of_convex;
 use super::distance::{Distance, Feature, Side, Undefined, cylinder, sphere};

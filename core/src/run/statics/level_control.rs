@@ -328,8 +328,8 @@ impl LevelControl<'_, '_> {
         }
     }
 
-    /// The contraction of corrections beyond which the next step will be taken half as long, whatever
-    /// state they lead to.
+    /// The ratio of successive corrections beyond which the next step will be taken half as long, whatever
+    /// state they lead to; infinite where it may not be.
     fn refused_contraction(&self) -> f64 {
         let is_refused = !self.stage.soft && self.levels.may_halve(false);
         if is_refused { self.stability.largest_contraction(self.stability.signature) } else { f64::INFINITY }

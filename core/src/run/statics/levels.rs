@@ -94,8 +94,8 @@ impl Levels {
         self.increment = self.increment.min(tried);
     }
 
-    /// After a step that was taken: the next one is twice as long, unless its corrections would contract
-    /// by more than `largest`. Their `contraction` grows in proportion to the step.
+    /// After a step that was taken: the next one is twice as long, unless the ratio of its corrections
+    /// would exceed `largest`. This ratio, `contraction` in the last step, grows in proportion to the step.
     pub fn lengthen(&mut self, contraction: f64, largest: f64) {
         if 2.0 * contraction <= largest {
             self.increment = (2.0 * self.increment).min(self.level);
