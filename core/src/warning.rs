@@ -121,6 +121,8 @@ warning_kinds! {
     ExtremeStiffness: "extreme_stiffness", RoundOff;
     /// An element turns far from node to node.
     CoarseMesh: "coarse_mesh", Mesh;
+    /// Tension makes bending decay over less than elements resolve.
+    CoarseLayer: "coarse_layer", Mesh;
     /// The estimated error of a computed section is large, or larger than `mesh` asks for.
     CoarseSection: "coarse_section", Mesh;
     /// The stiffness is linear between two computed sections that differ much.

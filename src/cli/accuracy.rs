@@ -218,8 +218,14 @@ fn meshes(found: &Meshes) -> ReachedMeshes {
 /// The message about an accuracy that was not reached.
 fn missed(found: &Found, wanted: &Accuracy) -> String {
     let (column, estimate) = found.worst(wanted);
+    let why = match found.jump {
+        None => "",
+        Some(_) => {
+            "; cables that become taut within steps cost accuracy: try `adaptive = true` with a small `step_tolerance`"
+        }
+    };
     format!(
-        "an error of {:e} of `{column}` was not reached; the best estimate is {estimate:.1e}, with {}",
+        "an error of {:e} of `{column}` was not reached; the best estimate is {estimate:.1e}, with {}{why}",
         wanted.of(column),
         describe(&found.variant)
     )

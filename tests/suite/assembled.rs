@@ -201,8 +201,8 @@ fn tangent_holds_in(regime: ContactRegime, text: &str, incremental: bool, seed: 
     let step = Step { scheme: Scheme::lie_generalized_alpha(0.6), length: 0.8 };
     let combinations = if incremental {
         let increments = Increments::new(&model, StageKind::Dynamic, &assembly.system.pattern.dof_map);
-        step.scheme.start(&mut state);
-        increments.start(&mut state);
+        step.scheme.start(&mut state, step.length, None);
+        increments.start(&mut state, None);
         increments.begin(&mut state, &step, 0.5);
         step.predict(&mut state, 0.5);
         correct(&assembly, &step, &numbers(&mut random, 0.3), &mut state, 1.0);

@@ -207,9 +207,9 @@ fn alternating_to(text: &str, scheme: Scheme, h: f64, end: f64, tip: &str) -> [f
     if !scene.plan.initial.is_empty() {
         set_in_motion(&scene.plan.initial, &mut state, &mut assembly, &mut newton.solver);
     }
-    scheme.start(&mut state);
+    scheme.start(&mut state, h, None);
     if let Some(increments) = &increments {
-        increments.start(&mut state);
+        increments.start(&mut state, None);
     }
     let (mut time, mut before, mut work) = (0.0, h, Work::default());
     for number in 0.. {

@@ -345,3 +345,71 @@ fn error_bars_say_where_a_polyline_may_stand_for_a_curve() {
     assert!(told(pieces, &["--error-bars"]) && !told(pieces, &[]));
     assert!(!told(corner, &["--error-bars"]) && !told(arc, &["--error-bars"]));
 }
+
+/// A mass of 2 that falls by half a unit into a cable, and swings a little.
+fn falling_into_a_cable(scheme: &str, damping: f64, step: f64) -> String {
+    format!(
+        "gravity = [0, 0, -10]\n[point]\ntop = [0, 0, 0]\nm = [0.001, 0, -1]\n[[body]]\nat = \"top\"\nmass = 1\ninertia = [1, 1, 1]\n\
+         [[support]]\nat = \"top\"\nfix = \"all\"\n[[body]]\nat = \"m\"\nmass = 2\n\
+         [[spring]]\nbetween = [\"top\", \"m\"]\nstiffness = 5000\nlength = 1.5\ntension_only = true\ndamping = {damping}\n\
+         [output]\nnodes = [\"m\"]\ncolumns = [\"x\", \"v\"]\n[[stage]]\nkind = \"dynamic\"\nend = 2\nstep = {step}\nscheme = \"{scheme}\"\n"
+    )
+}
+
+#[test]
+fn cables_that_become_taut_within_steps_are_in_the_estimate() {
+    for damping in [0.0, 5.0, 20.0] {
+        let exact = simulate(&falling_into_a_cable("newmark", damping, 2e-5)).column("m.z");
+        for scheme in ["newmark", "generalized_alpha", "lie_generalized_alpha", "hht"] {
+            let (mut of_all, mut least) = (0.0, f64::INFINITY);
+            for (step, stride) in [(0.01, 500), (0.008, 400), (0.005, 250), (0.004, 200), (0.002, 100), (0.001, 50)] {
+                let run = simulate(&falling_into_a_cable(scheme, damping, step));
+                let off = |(k, z): (usize, &f64)| (z - exact[stride * k]).abs();
+                let error = run.column("m.z").iter().enumerate().map(off).fold(0.0, f64::max);
+                let Largest { displacement, .. } = run.counters.findings.time_errors[0].largest;
+                let ratio = displacement / error;
+                // The sign of each error is that of chance, and beyond the size of the motion the estimate grows on.
+                assert!(
+                    ratio > 0.3 && (ratio < 20.0 || displacement > 0.3),
+                    "{scheme}, {damping}, {step}: {displacement} for {error}"
+                );
+                of_all += ratio.ln() / 6.0;
+                least = f64::min(least, ratio);
+            }
+            assert!(
+                (0.5..5.0).contains(&f64::exp(of_all)),
+                "{scheme}, {damping}: {} (at least {least})",
+                f64::exp(of_all)
+            );
+        }
+    }
+}
+
+#[test]
+fn an_accuracy_is_reached_with_cables_that_become_taut() {
+    let folder = Folder::new("accuracy_of_cables");
+    for (damping, accuracy) in [(0.0, 1e-3), (20.0, 1e-2)] {
+        folder.write("cable.toml", &falling_into_a_cable("generalized_alpha", damping, 0.01));
+        let run =
+            folder.beamsim(&["run", "cable.toml", "--accuracy", &accuracy.to_string(), "--out", "out", "--force"]);
+        assert_eq!(status(&run), 0, "{}", String::from_utf8_lossy(&run.stderr));
+        let exact = simulate(&falling_into_a_cable("newmark", damping, 2e-5));
+        let history = HistoryReader::read(&folder.0.join("out/history.csv")).unwrap();
+        let column = |name: &str| history.names.iter().position(|known| known == name).unwrap();
+        for name in ["m.z", "m.vz"] {
+            let (exact, time, own) = (exact.column(name), column("time"), column(name));
+            let size = exact.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
+            for row in &history.rows {
+                let steps = row[time] / 2e-5;
+                let (before, part) = ((steps as usize).min(exact.len() - 2), steps.fract());
+                let there = exact[before] * (1.0 - part) + exact[before + 1] * part;
+                assert!(
+                    (row[own] - there).abs() < accuracy * size,
+                    "{name} at {}: {} for {there}",
+                    row[time],
+                    row[own]
+                );
+            }
+        }
+    }
+}

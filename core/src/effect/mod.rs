@@ -29,11 +29,12 @@ use crate::kernel::inertia::Inertia;
 use crate::system::{
     Assembler, Category, Connectivity, ListedPair, Memory, MirrorData, Node, Plane, Slot, StageContext, State,
 };
-use crate::tensor::Vec3;
+use crate::tensor::{Mat3, Vec3};
 use batch::{
     ELEMENTS_PER_TASK, after_displacement, at_slots, for_each_batch, motion_of, motions, one_by_one, own_blocks,
     own_part, quadratic, shared, side_by_side,
 };
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// The stored energy of a state.
@@ -206,12 +207,34 @@ pub struct Roles<'a> {
     pub(crate) spins: Option<&'a dyn FreeSpins>,
     /// Contacts, with a memory from one converged state to the next
     pub(crate) contacts: Option<&'a dyn Contacts>,
+    /// Forces that jump
+    pub(crate) jumps: Option<&'a dyn Jumps>,
 }
 
 impl Roles<'_> {
     /// No role beside forces.
     pub const NONE: Self =
-        Self { constraint: None, stresses: None, masses: None, driven: None, spins: None, contacts: None };
+        Self { constraint: None, stresses: None, masses: None, driven: None, spins: None, contacts: None, jumps: None };
+}
+
+/// What jumps in a force along a motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
+pub enum ForceJump {
+    /// Its slope: the error of a time step over which it does is of second order
+    Slope,
+    /// The force itself: the error is of first order
+    Force,
+}
+
+/// The role of effects whose forces jump, or change their slope at once, where the motion passes
+/// some place.
+pub trait Jumps {
+    /// What has jumped between two states.
+    fn jumped(&self, from: &State, to: &State) -> Option<ForceJump>;
+
+    /// Shows by slot what the mean of the forces at both ends of a time step of some length misses
+    /// where a force has jumped: the mean force over the step less that mean (internal, spatial).
+    fn missed(&self, from: &State, to: &State, length: f64, show: &mut dyn FnMut(Slot, Vec3));
 }
 
 /// The role of constraints: gaps that multipliers close, and motors that prescribe them.
@@ -257,6 +280,27 @@ pub trait StressPoints {
 
     /// The largest round-off of forces and moments in a state.
     fn round_off(&self, at: &State) -> RoundOff;
+
+    /// Shows the bending at all points, element by element. `origin` is the state about which the
+    /// stage is linear; `None` in other stages.
+    fn each_bending(&self, at: &State, origin: Option<&State>, show: &mut dyn FnMut(Bending));
+}
+
+/// The bending of a beam at an integration point.
+#[derive(Clone, Copy, Debug)]
+pub struct Bending {
+    /// The nodes at the ends of its element
+    pub(crate) ends: [Node; 2],
+    /// The length that the point stands for
+    pub(crate) length: f64,
+    /// The moment (material)
+    pub(crate) moment: Vec3,
+    /// The unit tangent of the initial centre line
+    pub(crate) tangent: Vec3,
+    /// The stiffness against bending and twist, force times length squared
+    pub(crate) stiffness: Mat3,
+    /// The axial force
+    pub(crate) tension: f64,
 }
 
 /// The role of effects with mass.

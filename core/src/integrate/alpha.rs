@@ -106,11 +106,18 @@ impl Scheme {
         self.alpha_m - self.alpha_f
     }
 
-    /// Starts a stage: the algorithmic acceleration begins as the true one, which is taken for
-    /// constant before. A scheme without one takes no memory for it.
-    pub fn start(&self, state: &mut State) {
+    /// Starts a stage with steps of this length: the algorithmic acceleration begins as the true
+    /// one, which is taken for constant before, but for third rates `jerk` by slot, if given. A
+    /// scheme without one takes no memory for it.
+    pub fn start(&self, state: &mut State, length: f64, jerk: Option<&[Vec3]>) {
         state.algorithmic = if self.has_algorithmic() { state.a.clone() } else { Field::none() };
         state.earlier = state.algorithmic.clone();
+        let Some(jerk) = jerk.filter(|_| self.has_algorithmic()) else { return };
+        let changes = state.algorithmic.iter_mut().zip(state.earlier.iter_mut()).zip(jerk);
+        changes.for_each(|((algorithmic, earlier), &jerk)| {
+            *algorithmic += jerk * (self.lag() * length);
+            *earlier -= jerk * length;
+        });
     }
 
     /// True if the scheme carries an algorithmic acceleration beside the true one.

@@ -82,6 +82,11 @@ pub(super) struct CarriedError {
     /// The factor that scales the error to [`SCALED_ERROR`]; zero while there is no error
     scaling: f64,
     known: Known,
+    /// What the means of forces at both ends of the last steps have missed where forces jumped, by
+    /// slot (internal, spatial), and has not yet acted on the error
+    missed: Vec<(Slot, Vec3)>,
+    /// True if forces have jumped
+    has_jumped: bool,
     /// The number of steps
     steps: usize,
     /// The lengths of the last steps, each at the index of its number modulo [`SLOPE_STEPS`]
@@ -181,6 +186,8 @@ impl CarriedError {
             turned: Vec::new(),
             scaling: 0.0,
             known: Known::Nothing,
+            missed: Vec::new(),
+            has_jumped: false,
             steps: 0,
             lengths: [step.length; SLOPE_STEPS],
             largest: Largest::default(),
@@ -199,6 +206,11 @@ impl CarriedError {
     /// The change of the length of the present step.
     fn stretch(&self) -> Stretch {
         Stretch::new(self.step.length, self.before, self.step.scheme.lag())
+    }
+
+    /// True if the error is not zero.
+    pub fn has_error(&self) -> bool {
+        self.scaling > 0.0
     }
 
     /// True if [`Self::look`] has not been called in the present step.
@@ -278,6 +290,9 @@ impl CarriedError {
         // The solver sums the forces of all categories: those of the others are subtracted from the
         // forces on the error.
         const INERTIA: usize = Category::Inertia as usize;
+        for (slot, missed) in self.missed.drain(..) {
+            self.force[INERTIA][slot as usize] += missed;
+        }
         threads::each_part(&mut self.force[INERTIA], |start, part| {
             for (slot, force) in (start..).zip(part) {
                 let others = system.total(slot) - system.part_of(Category::Inertia, slot);
@@ -315,6 +330,12 @@ impl CarriedError {
             ];
             turned.push((k as Slot, changes.map(|change| change * (1.0 / *scaling))));
         }
+    }
+
+    /// Takes over what the means of forces at both ends of the step have missed, by slot.
+    pub fn miss(&mut self, missed: Vec<(Slot, Vec3)>) {
+        self.has_jumped |= !missed.is_empty();
+        self.missed.extend(missed);
     }
 
     /// Ends a step between two states in one chart, with the `error` that [`Self::solve`] has
@@ -446,7 +467,7 @@ impl CarriedError {
         let [all, ringing] = self.sums;
         let rings =
             ringing.displacement > RINGING_SHARE * all.displacement || ringing.rotation > RINGING_SHARE * all.rotation;
-        let most = if !places_bound_rates(&self.step.scheme) {
+        let most = if self.has_jumped || !places_bound_rates(&self.step.scheme) {
             f64::INFINITY
         } else if rings {
             MAX_GROWTH_RINGING

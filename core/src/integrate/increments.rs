@@ -48,12 +48,21 @@ impl Increments {
     }
 
     /// Starts a stage, after [`super::Scheme::start`]: the algorithmic rates of momenta begin as
-    /// the true ones.
-    pub fn start(&self, state: &mut State) {
+    /// those of the state `ahead`, in which the motion will be after `lag` steps, and those of the
+    /// step before as if momenta had gone on as they do from the state to that one.
+    pub fn start(&self, state: &mut State, ahead: Option<(&State, f64)>) {
         for &(slot, carrier) in &self.carriers {
-            let spin = state.spin(slot);
-            state.algorithmic[slot as usize] = spin.rotation.r * carrier.rate(spin.omega, spin.acceleration);
-            state.earlier[slot as usize] = state.algorithmic[slot as usize];
+            let rate = |state: &State| {
+                let spin = state.spin(slot);
+                spin.rotation.r * carrier.rate(spin.omega, spin.acceleration)
+            };
+            let k = slot as usize;
+            let now = rate(state);
+            (state.algorithmic[k], state.earlier[k]) = (now, now);
+            if let Some((ahead, lag)) = ahead {
+                let then = rate(ahead);
+                (state.algorithmic[k], state.earlier[k]) = (then, now - (then - now) * (1.0 / lag));
+            }
         }
     }
 
@@ -138,7 +147,10 @@ impl Increments {
             let spin = state.spin(slot);
             let driven = carrier.inverse * carrier.rate(spin.omega, spin.acceleration);
             let r = spin.rotation.r;
-            Accelerations { slot, driven: r * driven, free: r * (spin.acceleration - driven), spin: spin.omega }
+            let (tensor, omega) = (carrier.tensor, spin.omega);
+            let of_free = carrier.inverse * (driven.cross(tensor * omega) + omega.cross(tensor * driven));
+            let free = spin.acceleration - driven;
+            Accelerations { slot, driven: r * driven, free: r * free, lead: r * of_free * (-1.0 / 12.0), spin: omega }
         })
     }
 }
@@ -151,6 +163,10 @@ pub struct Accelerations {
     pub(crate) driven: Vec3,
     /// phi: the part by the spin itself, without moments
     pub(crate) free: Vec3,
+    /// A twelfth of the rate of phi by moments, which steps leave out: they take phi at their end for
+    /// that of the momentum of their start. With beta - 1/6 + (alpha_m - alpha_f)/2 times mu' it is
+    /// what spins of steps lead those of a smooth motion by, over h^2
+    pub(crate) lead: Vec3,
     /// The spin, material
     pub(crate) spin: Vec3,
 }

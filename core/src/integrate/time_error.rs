@@ -128,6 +128,8 @@ pub struct TimeError {
     longest: Option<Step>,
     /// The sizes of local errors, summed over the steps before the error was carried
     sum: Largest,
+    /// True if forces may jump within steps
+    sees_jumps: bool,
     carried: Option<Box<CarriedError>>,
 }
 
@@ -166,9 +168,13 @@ impl TimeError {
             of_steps: duration / first.length,
             longest: None,
             sum: Largest::default(),
+            // In linear stages nothing does.
+            sees_jumps: assembly.origin().is_none() && model.jumps().next().is_some(),
             carried: None,
         };
-        if model.slots() <= SLOTS_CARRIED_AT_ONCE {
+        // The sum of local errors does not show forces that jump.
+        let at_once = if error.sees_jumps { MAX_SLOTS_CARRIED } else { SLOTS_CARRIED_AT_ONCE };
+        if model.slots() <= at_once {
             error.carry(&assembly.system, state, first);
         }
         error
@@ -183,6 +189,11 @@ impl TimeError {
         if let Some(carried) = &mut self.carried {
             carried.begin(step, before);
         }
+    }
+
+    /// True if an error is carried, and is not zero.
+    pub fn has_error(&self) -> bool {
+        self.carried.as_ref().is_some_and(|carried| carried.has_error())
     }
 
     /// True if an error is carried and [`Self::look`] has not been called in the present step.
@@ -209,6 +220,7 @@ impl TimeError {
     /// found.
     pub fn end(
         &mut self,
+        model: &Model,
         system: &System,
         error: &[Vec3],
         step_ends: StepEnds,
@@ -216,6 +228,9 @@ impl TimeError {
         increments: Option<&Increments>,
     ) {
         if let Some(carried) = &mut self.carried {
+            if self.sees_jumps {
+                carried.miss(model.missed(step_ends.from, step_ends.to, step.length));
+            }
             return carried.end(&system.pattern.dof_map, error, step_ends, increments);
         }
         self.steps += 1;

@@ -2,7 +2,7 @@
 
 use super::linear::LinearisedSystem;
 use super::{Model, StageContext};
-use crate::effect::{Effect, PlanarForm, RoundOff, TangentForm};
+use crate::effect::{Bending, Effect, PlanarForm, RoundOff, TangentForm};
 use crate::interrupt;
 use crate::kernel::Weights;
 use crate::system::{
@@ -333,6 +333,13 @@ impl Assembly {
     pub fn round_off(&self, state: &State) -> RoundOff {
         let stresses = self.effects.iter().filter_map(|acting| acting.effect.roles().stresses);
         stresses.map(|stresses| stresses.round_off(state)).fold(RoundOff::default(), RoundOff::or)
+    }
+
+    /// Shows the bending at all integration points of beams, see [`StressPoints::each_bending`](crate::effect::StressPoints::each_bending).
+    /// `origin` is the state about which the stage is linear; `None` in other stages.
+    pub fn each_bending(&self, state: &State, origin: Option<&State>, show: &mut dyn FnMut(Bending)) {
+        let stresses = self.effects.iter().filter_map(|acting| acting.effect.roles().stresses);
+        stresses.for_each(|stresses| stresses.each_bending(state, origin, show));
     }
 
     /// The largest strain that a field of increments makes, see [`Effect::strain_of`].

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 pub(super) struct IssuedWarnings {
     /// That an element turns far from node to node
     pub(super) coarse: bool,
+    /// That tension makes bending decay over less than elements resolve
+    pub(super) layers: bool,
     /// How many limit and branch points
     pub(super) points: usize,
     /// How uncertain round-off leaves displacements; below the first value nothing is worth a
@@ -34,6 +36,7 @@ impl Default for IssuedWarnings {
     fn default() -> Self {
         Self {
             coarse: false,
+            layers: false,
             points: 0,
             uncertainty: 1e-7,
             frame: 1e-2,

@@ -4,6 +4,7 @@ mod distance;
 mod failure;
 mod findings;
 mod issued;
+mod layers;
 mod refusal;
 mod results;
 

@@ -3,6 +3,7 @@
 use super::energy::Ledger;
 use super::failure::Moment;
 use super::findings::Findings;
+use crate::effect::ForceJump;
 use crate::model::Model;
 use crate::solve::Work;
 use crate::system::{State, System};
@@ -43,6 +44,8 @@ pub struct Counters {
     pub cutbacks: u64,
     /// Mixed elements, summed over converged states
     pub mixed_elements: u64,
+    /// What has jumped within levels or steps, where cables became slack or taut
+    pub jump: Option<ForceJump>,
     /// Augmentations and changes of contacts
     pub contacts: ContactCounters,
     /// Events, stability, warnings

@@ -183,11 +183,20 @@ impl StageRun<'_> {
         self.unless_interrupted()?;
         self.continue_to_state()?;
         self.judge_mesh()?;
+        self.look_for_jumps();
         self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
         if self.keeps_account {
             self.book_step();
         }
         Ok(())
+    }
+
+    /// Notes what has jumped since the last accepted state. In linear stages a cable stays as it is.
+    fn look_for_jumps(&mut self) {
+        if !self.is_linear() {
+            let jumped = self.model.jumps().filter_map(|effect| effect.jumped(self.good, self.state)).max();
+            self.counters.jump = self.counters.jump.max(jumped);
+        }
     }
 
     /// Books the work of the step that ends here, and that of the impulses in it.

@@ -83,7 +83,8 @@ pub struct SmallMotion {
     pub(crate) exponent: Complex<f64>,
     /// Relative error of |s| that round-off in the stiffness may cause
     pub(crate) uncertainty: f64,
-    /// Shape of an uncertain motion of an undamped symmetric problem
+    /// Shape of an uncertain motion of an undamped symmetric problem; of every motion if
+    /// [`ModeSearch::keep_shapes`] was called
     pub(crate) shape: Option<ModeShape>,
 }
 
@@ -113,6 +114,9 @@ pub struct ModeShape {
     pub(crate) unknowns: Vec<f64>,
     /// Modal mass x . M x
     pub(crate) mass: f64,
+    /// True if the problem is undamped and symmetric, and the frequency has lost digits, which the
+    /// shape tells
+    pub(crate) is_lossy: bool,
 }
 
 /// Structure of the eigenvalue problem.
@@ -157,6 +161,8 @@ pub struct ModeSearch<'a> {
     solver: &'a mut LinearSolver,
     matrices: &'a Matrices,
     form: ProblemForm,
+    /// True if motions have their shapes
+    keeps_shapes: bool,
     /// Equations of multipliers
     multipliers: Vec<usize>,
     /// Orthonormal rigid motions of free parts that nothing damps, and M times each; all vectors are
@@ -214,6 +220,11 @@ impl Matrices {
 }
 
 impl<'a> ModeSearch<'a> {
+    /// From here on motions have their shapes.
+    pub fn keep_shapes(&mut self, keeps: bool) {
+        self.keeps_shapes = keeps;
+    }
+
     /// Search with these matrices, in the space orthogonal to the `rigid` motions. `scales` are those
     /// that the equations are compared with.
     pub fn new(
@@ -243,6 +254,7 @@ impl<'a> ModeSearch<'a> {
             matrices,
             form,
             multipliers,
+            keeps_shapes: false,
             rigid: Vec::new(),
             damped_rigid: Vec::new(),
             shift: 0.0,
@@ -654,8 +666,9 @@ impl<'a> ModeSearch<'a> {
             ProblemForm::Gyroscopic | ProblemForm::General => (terms[2].norm() / moved).min(1.0),
         };
         let uncertainty = if is_free { 0.0 } else { share * uncertainty };
-        let is_asked_for = self.form == ProblemForm::Symmetric && uncertainty > MAX_UNCERTAINTY;
-        let shape = is_asked_for.then_some(ModeShape { unknowns: re, mass: mass.re });
+        let is_lossy = self.form == ProblemForm::Symmetric && uncertainty > MAX_UNCERTAINTY;
+        let unknowns = if is_lossy || dot(&re, &re) >= dot(&im, &im) { re } else { im };
+        let shape = (is_lossy || self.keeps_shapes).then_some(ModeShape { unknowns, mass: mass.re, is_lossy });
         (balances || is_free).then_some(SmallMotion { exponent, uncertainty, shape })
     }
 

@@ -192,9 +192,16 @@ impl Newton {
     }
 
     /// Passes the last time step to the error estimator.
-    pub fn end_step(&mut self, system: &System, step_ends: StepEnds, step: &Step, increments: Option<&Increments>) {
+    pub fn end_step(
+        &mut self,
+        model: &Model,
+        system: &System,
+        step_ends: StepEnds,
+        step: &Step,
+        increments: Option<&Increments>,
+    ) {
         if let Some(time_error) = &mut self.time_error {
-            time_error.end(system, &self.dq, step_ends, step, increments);
+            time_error.end(model, system, &self.dq, step_ends, step, increments);
         }
     }
 }
@@ -280,7 +287,8 @@ impl Solution<'_> {
         let is_last = self.iterations >= self.newton.max_iterations;
         match verdict {
             Verdict::Converged if self.prescribed_increment.is_none() && !self.state.contacts.holds_on => {
-                if residual.ratio > 0.0 {
+                let carries_error = self.newton.time_error.as_ref().is_some_and(TimeError::has_error);
+                if residual.ratio > 0.0 || carries_error {
                     self.polish(forms);
                 }
                 self.end();

@@ -3,11 +3,20 @@
 use crate::deck::{Accuracy, Deck};
 use crate::study::cost::{Sampler, Samples};
 use crate::study::scale::mesh_error;
+use beamsim_core::effect::ForceJump;
 use beamsim_core::probe::MeshError;
 
 /// The order of the error over the step that is assumed, of any scheme: vibrations that steps do not
 /// resolve err by second order.
 const ASSUMED_TIME_ORDER: f64 = 1.5;
+
+/// The order of the error over the step where something jumps within steps, of any scheme.
+pub fn jump_order(jump: ForceJump) -> f64 {
+    match jump {
+        ForceJump::Slope => 2.0,
+        ForceJump::Force => 1.0,
+    }
+}
 
 /// Orders of the error over a width.
 #[derive(Clone, Copy, Debug)]
@@ -86,6 +95,8 @@ pub enum Source {
     Mesh(usize),
     /// The steps, of a scheme of an order
     Steps(f64),
+    /// Steps within which something jumps, as where cables become taut
+    StepsWithJumps(ForceJump),
 }
 
 impl Source {
@@ -94,6 +105,16 @@ impl Source {
         match self {
             Self::Mesh(order) => falls.in_space(order),
             Self::Steps(order) => Orders { assumed: ASSUMED_TIME_ORDER, smooth: order },
+            Self::StepsWithJumps(jump) => Orders { assumed: jump_order(jump), smooth: jump_order(jump) },
+        }
+    }
+
+    /// True if the sign and the size of an error depend on where within a step something happens: two
+    /// runs may agree by chance.
+    fn is_random(self) -> bool {
+        match self {
+            Self::StepsWithJumps(_) => true,
+            Self::Mesh(_) | Self::Steps(_) => false,
         }
     }
 }
@@ -198,13 +219,18 @@ impl Fall {
         }
         for (number, one) in Falls::ALL.into_iter().enumerate() {
             let is_of = |k: usize| falls[k] == one && !between[k];
-            let size = outputs.largest_of(&differences, is_of);
-            if size.is_nan() {
+            let seen = outputs.largest_of(&differences, is_of);
+            if seen.is_nan() {
                 continue;
             }
-            let growth = ratio.powf(self.traces[number].order(source.orders(one), Difference { width, ratio, size }));
+            let orders = source.orders(one);
+            let now = Difference { width, ratio, size: seen };
+            let expected = self.traces[number].expected(orders.smooth, now).filter(|_| source.is_random());
+            let size = expected.map_or(seen, |expected| seen.max(expected));
+            let by_chance = if seen > 0.0 { size / seen } else { 1.0 };
+            let growth = ratio.powf(self.traces[number].order(orders, Difference { size, ..now }));
             for k in (0..falls.len()).filter(|&k| is_of(k)) {
-                differences[k] /= growth - 1.0;
+                differences[k] *= by_chance / (growth - 1.0);
                 of_coarser[k] = differences[k] * growth;
             }
             largest[number] = size / (growth - 1.0);
@@ -223,6 +249,12 @@ impl Fall {
 }
 
 impl Trace {
+    /// The size that the difference of the round before leads to expect of `now`, with errors of an
+    /// order; `None` in the first round.
+    fn expected(&self, order: f64, now: Difference) -> Option<f64> {
+        self.before.map(|before| before.size * now.of_order(order) / before.of_order(order))
+    }
+
     /// The order that the estimate uses: the observed one where it is lower than the assumed one,
     /// as for waves with fronts; half way to it where it is higher.
     fn order(&mut self, Orders { assumed, smooth }: Orders, now: Difference) -> f64 {

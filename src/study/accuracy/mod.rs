@@ -31,6 +31,7 @@ use super::outputs;
 use crate::deck::{Accuracy, Beam, Deck, Diagnostic, HistoryUse, InterpolationWord, StageBody};
 use crate::scene::Scene;
 use crate::study::Outcome;
+use beamsim_core::effect::ForceJump;
 use beamsim_core::run::{Failure, JumpKind, Plan, StageWork, rehearse};
 use search::Search;
 
@@ -67,6 +68,8 @@ pub struct Found {
     pub ratio: f64,
     /// The failure that stopped the search early
     pub stopped: Option<Failure>,
+    /// What jumped within steps
+    pub(crate) jump: Option<ForceJump>,
     /// The number of runs
     pub runs: usize,
     /// All outputs of the variant, where they were kept, so that it need not run again

@@ -1,13 +1,14 @@
 //! The search for a variant of a deck that is accurate enough.
 
 use super::candidates::{Candidate, Estimate, Estimates};
-use super::estimate::{ErrorShare, Fall, Outputs, Pair, Source, left_by_newton};
+use super::estimate::{ErrorShare, Fall, Outputs, Pair, Source, jump_order, left_by_newton};
 use super::indicator::{self, PlacedMesh};
 use super::round::{Compared, Round, Trials};
 use super::{CUBIC, Found, Meshes, coarser, has_long_steps, scaled};
 use crate::deck::{Accuracy, Beam, SchemeName, Stage, StageBody};
 use crate::study::StudyError;
 use crate::study::cost::{Companion, Family, Mesher, Pace, Placement, Pool, Trial, Variant, order_in_time};
+use beamsim_core::effect::ForceJump;
 use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 use std::sync::Arc;
@@ -96,6 +97,8 @@ pub struct Search<'a> {
     longest: Pace,
     /// True if Lobatto's scheme may be tried, and has not been
     may_take_lobatto: bool,
+    /// What has jumped within steps of a run
+    jump: Option<ForceJump>,
     in_space: KnownShares<Mesh>,
     in_time: KnownShares<Pace>,
     /// A variant with more work is not tried.
@@ -161,6 +164,7 @@ impl<'a> Search<'a> {
             pace,
             longest: pace,
             may_take_lobatto,
+            jump: None,
             in_space,
             in_time,
             most_work,
@@ -413,7 +417,15 @@ impl<'a> Search<'a> {
             return Estimates { own: Estimate { mesh: unknown(), step: unknown() }, remeshed: None };
         }
         let step = self.share_of_steps(round, trials);
-        let (mesh, remeshed) = self.shares_of_meshes(round, trials);
+        let (mut mesh, mut remeshed) = self.shares_of_meshes(round, trials);
+        // Meshes that do not resolve bending hardly differ from each other.
+        let unresolved = 2.0_f64.powf(self.family.order.unwrap_or(1) as f64 + 1.0);
+        let shares = [(Some(&mut mesh), Some(&trials.own)), (remeshed.as_mut(), trials.remeshed.as_ref())];
+        for (share, trial) in shares {
+            if let Some((share, _)) = share.zip(trial.filter(|trial| trial.has_coarse_layers)) {
+                share.largest = share.largest.max(unresolved);
+            }
+        }
         Estimates { own: Estimate { mesh, step }, remeshed }
     }
 
@@ -428,7 +440,9 @@ impl<'a> Search<'a> {
                 let none = vec![false; self.mesher.sampler.columns.len()];
                 let outputs = Outputs { sampler: self.mesher.sampler, wanted: self.wanted, between: &none };
                 let pair = longer.and_then(|longer| pair(own, longer, width, *ratio));
-                share(&mut self.in_time.fall, Source::Steps(order), pair, &outputs)
+                self.jump = self.jump.max(own.jump).max(longer.and_then(|longer| longer.jump));
+                let source = self.jump.map_or(Source::Steps(order), Source::StepsWithJumps);
+                share(&mut self.in_time.fall, source, pair, &outputs)
             }
             None => self.in_time.known(&self.pace, round.own.width()).unwrap_or_else(|| self.none()),
         };
@@ -477,6 +491,7 @@ impl<'a> Search<'a> {
             estimates: shares.map(|(mesh, step)| left + mesh + step).collect(),
             ratio: estimate.ratio(),
             stopped: None,
+            jump: self.jump,
             runs,
             variant,
             outcome: None,
@@ -533,7 +548,7 @@ impl<'a> Search<'a> {
 
     fn change_step(&mut self, over: f64, other_changes: bool) {
         let Pace::Steps(factor) = self.pace else { return };
-        if over > WORTH_LOBATTO && over.is_finite() && self.may_take_lobatto {
+        if over > WORTH_LOBATTO && over.is_finite() && self.may_take_lobatto && self.jump.is_none() {
             self.may_take_lobatto = false;
             self.set_scheme(Some(SchemeName::Lobatto));
         } else if over > 1.0 {
@@ -549,8 +564,11 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The order of the errors of steps, for smooth solutions.
+    /// The order of the errors of steps, for smooth solutions if nothing jumps.
     fn order_in_time(&self) -> f64 {
+        if let Some(jump) = self.jump {
+            return jump_order(jump);
+        }
         let expected = order_in_time(self.mesher.original.deck, &self.family);
         expected.map_or(LOWEST_ORDER, |expected| expected.order.max(LOWEST_ORDER))
     }

@@ -8,8 +8,10 @@ use crate::study::built::BuiltDeck;
 use crate::study::change::Change;
 use crate::study::outcome::Outcome;
 use crate::study::strains::StrainRecord;
+use beamsim_core::effect::ForceJump;
 use beamsim_core::failure::FailureKind;
-use beamsim_core::run::Failure;
+use beamsim_core::run::{Failure, Warning};
+use beamsim_core::warning::WarningKind;
 use cpu_time::ThreadTime;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -47,6 +49,12 @@ pub struct Trial {
     pub iterations: u64,
     /// Factorisations
     pub factorisations: u64,
+    /// True if elements do not resolve bending that tension makes decay
+    #[serde(default)]
+    pub(crate) has_coarse_layers: bool,
+    /// What has jumped within steps
+    #[serde(default)]
+    pub(crate) jump: Option<ForceJump>,
     /// The time it took
     pub(super) seconds: Seconds,
 }
@@ -64,7 +72,16 @@ impl Trial {
     /// The result of a run that did not finish.
     pub(super) fn ended(status: &str) -> Self {
         let seconds = Seconds { cpu: f64::NAN, wall: f64::NAN };
-        Self { status: status.into(), samples: Vec::new(), steps: 0, iterations: 0, factorisations: 0, seconds }
+        Self {
+            status: status.into(),
+            samples: Vec::new(),
+            steps: 0,
+            iterations: 0,
+            factorisations: 0,
+            has_coarse_layers: false,
+            jump: None,
+            seconds,
+        }
     }
 
     /// True if the run finished: then there are numbers to compare.
@@ -113,12 +130,18 @@ pub fn run(
                 steps: outcome.counters.steps,
                 iterations: outcome.counters.work.iterations,
                 factorisations: outcome.counters.work.factorisations,
+                has_coarse_layers: outcome.counters.findings.warnings.iter().any(is_coarse_layer),
+                jump: outcome.counters.jump,
                 seconds,
             }
         }
         Err(_) => Trial { seconds, ..Trial::ended("deck") },
     };
     (trial, outcome.ok())
+}
+
+fn is_coarse_layer(warning: &Warning) -> bool {
+    warning.kind == WarningKind::CoarseLayer
 }
 
 /// True if a variant describes a scene that has the compared outputs.

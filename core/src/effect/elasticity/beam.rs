@@ -6,7 +6,7 @@ use super::interpolation::{
 };
 use super::planar::PlanarElasticity;
 use crate::effect::{
-    ByOrder, DrivenCoordinates, ELEMENTS_PER_TASK, Effect, Energy, PlanarForm, Roles, RoundOff, StressPoints,
+    Bending, ByOrder, DrivenCoordinates, ELEMENTS_PER_TASK, Effect, Energy, PlanarForm, Roles, RoundOff, StressPoints,
     TangentForm, at_slots, for_each_batch, side_by_side,
 };
 use crate::kernel::law::{SectionLaw, StoredLaw, Strain, Stress};
@@ -255,6 +255,12 @@ impl<I: Interpolation> StressPoints for BeamElasticity<I> {
             );
         });
         largest
+    }
+
+    fn each_bending(&self, at: &State, origin: Option<&State>, show: &mut dyn FnMut(Bending)) {
+        for_each_batch!(self.elements, |_first, batch| for element in batch {
+            element.each_bending::<I>(at, origin, show);
+        });
     }
 }
 
@@ -531,6 +537,22 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
             let added = point.law.tangent(&point.elastic_part(&strain, free_at_origin)).stress(&change);
             (strain + change, stress + added)
         })
+    }
+
+    /// Shows the bending at each point.
+    fn each_bending<I: Interpolation>(&self, at: &State, origin: Option<&State>, show: &mut dyn FnMut(Bending)) {
+        let nodes = &self.connection.nodes;
+        let ends = [nodes[0], nodes[N - 1]];
+        for (point, (_, stress)) in self.points().iter().zip(self.strains_and_stresses::<I>(at, origin)) {
+            show(Bending {
+                ends,
+                length: point.weight,
+                moment: stress.m,
+                tangent: point.tangent,
+                stiffness: point.law.stiffness_at_rest().cm,
+                tension: stress.n.dot(point.tangent),
+            });
+        }
     }
 
     #[inline(never)]

@@ -4,11 +4,15 @@
 //! n = (x_b - x_a)/l,   F = k (l - l0) + c dl/dt,   f_b = F n = -f_a
 //! ```
 
-use crate::effect::{Effect, Energy, Roles, TangentForm};
+use crate::effect::{Effect, Energy, ForceJump, Jumps, Roles, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
 use crate::scalar::Real;
-use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Slot, State};
 use crate::tensor::{Mat3, Vec3};
+
+/// The parts of a time step, within which a cable becomes slack or taut, of whose forces the mean is
+/// taken.
+const PARTS: usize = 16;
 
 /// A spring or cable between two nodes.
 #[derive(Clone, Copy, Debug)]
@@ -82,6 +86,46 @@ impl Link {
             over_place: along.scale(self.stiffness) + across + turning,
             over_velocity: along.scale(self.damping),
         }
+    }
+
+    /// True for a cable of the length of `d` without force.
+    fn is_slack(&self, d: Vec3) -> bool {
+        self.tension_only && d.norm() <= self.length
+    }
+
+    /// The force at the second node, elastic and of damping.
+    fn force(&self, [d, rate]: [Vec3; 2]) -> Vec3 {
+        let pull = self.pull(d, rate);
+        pull.elastic + pull.damping
+    }
+
+    /// The vector from the first node to the second and its rate between two states, at a `part` of
+    /// the time from one to the other, `length`: a cubic with their places and velocities.
+    fn within(&self, ends: [&State; 2], length: f64, part: f64) -> [Vec3; 2] {
+        let [(from, from_rate), (to, to_rate)] = ends.map(|at| self.between(at));
+        let rest = 1.0 - part;
+        let bulge = from_rate * rest - to_rate * part;
+        let way = to - from;
+        let d = from * (rest * rest * (1.0 + 2.0 * part))
+            + to * (part * part * (3.0 - 2.0 * part))
+            + bulge * (length * part * rest);
+        let rate = way * (6.0 * part * rest / length)
+            + from_rate * (rest * (rest - 2.0 * part))
+            + to_rate * (part * (part - 2.0 * rest));
+        [d, rate]
+    }
+
+    /// What the mean of the forces at both ends misses, see [`Jumps::missed`]; `None` where the
+    /// cable is slack all the time, or taut.
+    fn missed(&self, from: &State, to: &State, length: f64) -> Option<Vec3> {
+        let at = |part: f64| self.within([from, to], length, part);
+        let is_slack = [0.0, 0.5, 1.0].map(|part| self.is_slack(at(part)[0]));
+        if is_slack == [true; 3] || is_slack == [false; 3] {
+            return None;
+        }
+        let part = |k: usize| (k as f64 + 0.5) / PARTS as f64;
+        let sum = (0..PARTS).fold(Vec3::ZERO, |sum, k| sum + self.force(at(part(k))));
+        Some(sum * (1.0 / PARTS as f64) - (self.force(at(0.0)) + self.force(at(1.0))) * 0.5)
     }
 
     fn between(&self, at: &State) -> (Vec3, Vec3) {
@@ -158,11 +202,36 @@ impl Effect for Links {
             let stretch = if distance == 0.0 { change.norm() } else { d.dot(change).abs() / distance };
             if slack || link.stiffness == 0.0 { 0.0 } else { stretch / length }
         };
-        let acting = self.links.iter().filter(|link| at.amplitude[link.amplitude] != 0.0);
-        acting.map(one).fold(0.0, f64::max)
+        self.acting(at).map(one).fold(0.0, f64::max)
     }
 
     fn roles(&self) -> Roles<'_> {
-        Roles::NONE
+        let has_cables = self.links.iter().any(|link| link.tension_only);
+        Roles { jumps: has_cables.then_some(self as &dyn Jumps), ..Roles::NONE }
+    }
+}
+
+impl Jumps for Links {
+    fn jumped(&self, from: &State, to: &State) -> Option<ForceJump> {
+        let has_changed = |link: &&Link| link.is_slack(link.between(from).0) != link.is_slack(link.between(to).0);
+        let changed = self.acting(to).filter(has_changed);
+        changed.map(|link| if link.damping == 0.0 { ForceJump::Slope } else { ForceJump::Force }).max()
+    }
+
+    fn missed(&self, from: &State, to: &State, length: f64, show: &mut dyn FnMut(Slot, Vec3)) {
+        for link in self.acting(to) {
+            if let Some(missed) = link.missed(from, to, length) {
+                let [a, b] = link.nodes.map(|node| node.u);
+                show(a, -missed);
+                show(b, missed);
+            }
+        }
+    }
+}
+
+impl Links {
+    /// The springs and cables that act in a state.
+    fn acting<'a>(&'a self, at: &'a State) -> impl Iterator<Item = &'a Link> {
+        self.links.iter().filter(|link| at.amplitude[link.amplitude] != 0.0)
     }
 }

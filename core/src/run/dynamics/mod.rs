@@ -5,6 +5,7 @@ pub(super) mod checkpoint;
 mod grid;
 mod judgement;
 mod middle;
+mod smooth_start;
 mod start;
 mod two_stages;
 
@@ -107,6 +108,7 @@ impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
         self.warn_of_imbalance();
         self.warn_of_contacts();
         self.stage.warn_of_soft_stick();
+        self.stage.warn_of_layers();
         self.judge_steps();
     }
 }
@@ -350,8 +352,9 @@ impl Dynamics<'_, '_> {
         if let Some(middle) = &self.middle {
             self.stage.refuse_missed_within(&middle.state)?;
         }
-        let StageRun { assembly, newton, state, good, .. } = &mut *self.stage;
-        newton.end_step(&assembly.system, StepEnds { from: good, to: state }, &step, self.increments.as_ref());
+        let StageRun { assembly, newton, state, good, model, .. } = &mut *self.stage;
+        let ends = StepEnds { from: good, to: state };
+        newton.end_step(model, &assembly.system, ends, &step, self.increments.as_ref());
         Ok(())
     }
 

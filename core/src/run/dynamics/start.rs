@@ -39,16 +39,15 @@ impl Dynamics<'_, '_> {
             contacts.begin_motion(self.stage.state);
         }
         self.solve_accelerations()?;
-        self.settings.scheme.start(self.stage.state);
-        if let Some(increments) = &self.increments {
-            increments.start(self.stage.state);
-        }
+        let jerk = self.jerk_of_joints()?;
+        self.start_scheme(jerk.as_ref());
         if begins {
             let StageRun { bookkeeper, model, state, assembly, .. } = &mut *self.stage;
             bookkeeper.bring_in(Entry::new(model, state, assembly));
         }
         self.stage.open_account()?;
         self.open_guard();
+        self.lead_velocities(jerk.as_ref());
         Ok(())
     }
 
@@ -248,7 +247,7 @@ impl Dynamics<'_, '_> {
 
     /// Solves with the mass matrix, bordered by the gaps of joints, whose rows ask for -`gaps`;
     /// `None` where mass alone does not tell the solution, but stiffness holds everything.
-    fn solve_with_mass(&mut self, gaps: &[Vec3]) -> Result<Option<Vec<Vec3>>, Failure> {
+    pub(super) fn solve_with_mass(&mut self, gaps: &[Vec3]) -> Result<Option<Vec<Vec3>>, Failure> {
         let StageRun { assembly, newton, model, state, counters, .. } = &mut *self.stage;
         let (solver, system) = (&mut newton.solver, &mut assembly.system);
         for &slot in &model.multipliers {

@@ -9,8 +9,10 @@ pub(super) use vibrations::{Vibrations, pivots_tell, vibrations};
 use self::rigid::{free_spins, rigid_motions};
 use self::search::{Found, find_modes, first_shift, grows, matrices};
 use super::failure::Failure;
+use super::layers::Unresolved;
 use super::results::{Mode, StageResult};
 use super::stage_run::{Analysis, StageRun, Teller};
+use crate::effect::Bending;
 use crate::model::StageError;
 use crate::solve::{Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, mechanism};
 use crate::sorting::sort_by;
@@ -55,6 +57,7 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
             self.refine(motion);
         }
         self.warn_of_modes(&found, &listed);
+        self.warn_of_layers(&listed);
         self.warn_of_spin(spin, &listed);
         self.stage.counters.steps += 1;
         // What moved moves on.
@@ -115,12 +118,14 @@ impl Modal<'_, '_> {
         let mut rigid = rigid_motions(assembly, model, state, &plan.places);
         rigid.extend(free_spins(&assembly.system, model, state));
         self.refuse_massless_mechanisms(matrices)?;
+        let has_layers = self.stage.bending().iter().any(Bending::may_be_unresolved);
         let moment = self.stage.moment();
         let StageRun { assembly, newton, observer, counters, number, plan, model, .. } = &mut *self.stage;
         let scales = model.scales(&assembly.system.pattern.dof_map);
         let mut teller = Teller { observer: &mut **observer, at: moment, number: *number, stages: plan.stages.len() };
         let shift = first_shift(matrices, &assembly.system);
         let mut search = ModeSearch::new(&mut assembly.system, &mut newton.solver, matrices, rigid, scales);
+        search.keep_shapes(has_layers);
         let tell = &mut |done| teller.tell(done);
         let found = find_modes(&mut search, shift, self.modes, tell, &mut counters.work)?;
         self.stage.unless_interrupted()?;
@@ -157,10 +162,9 @@ impl Modal<'_, '_> {
     /// Rayleigh's quotient of a motion with its stiffness from strains: digits that the tangent has
     /// lost are there again, as far as the shape is right.
     fn refine(&mut self, motion: &mut SmallMotion) {
-        let Some(ModeShape { unknowns, mass }) = motion.shape.take() else { return };
+        let Some(ModeShape { mass, .. }) = motion.shape.as_ref().filter(|shape| shape.is_lossy) else { return };
+        let field = self.field(motion).unwrap_or_default();
         let StageRun { assembly, state, .. } = &mut *self.stage;
-        let mut field = vec![Vec3::ZERO; state.q.len()];
-        assembly.system.pattern.dof_map.scatter(&unknowns, None, &mut field);
         let Some(stiffness) = assembly.stiffness_along(state, &field) else { return };
         let square = -stiffness / mass;
         motion.exponent = match square < 0.0 {
@@ -169,6 +173,26 @@ impl Modal<'_, '_> {
         };
         // What is wrong with the shape enters squared.
         motion.uncertainty *= motion.uncertainty;
+    }
+
+    /// The increments of the unknowns in a motion, where its shape is known.
+    fn field(&self, motion: &SmallMotion) -> Option<Vec<Vec3>> {
+        let StageRun { assembly, state, .. } = &*self.stage;
+        let mut field = vec![Vec3::ZERO; state.q.len()];
+        assembly.system.pattern.dof_map.scatter(&motion.shape.as_ref()?.unknowns, None, &mut field);
+        Some(field)
+    }
+
+    /// Warns of the first mode whose bending decays over less than elements resolve.
+    fn warn_of_layers(&mut self, listed: &[SmallMotion]) {
+        let place = |motion: &SmallMotion| {
+            Some(self.stage.bending_along(&self.field(motion)?)).and_then(|points| Unresolved::worst(&points))
+        };
+        let Some((number, place)) = listed.iter().enumerate().find_map(|(k, motion)| Some((k, place(motion)?))) else {
+            return;
+        };
+        let message = place.message(&format!("stage {}, mode {}", self.stage.number + 1, number + 1), self.stage.model);
+        self.stage.warn(WarningKind::CoarseLayer, message);
     }
 
     fn warn_of_modes(&mut self, found: &Found, listed: &[SmallMotion]) {

@@ -87,6 +87,7 @@ impl<'r> Analysis<'r> for ArcLength<'_, 'r> {
 
     fn judge(&mut self) {
         self.stage.warn_of_standstill();
+        self.stage.warn_of_layers();
     }
 }
 

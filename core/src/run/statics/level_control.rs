@@ -72,6 +72,7 @@ impl<'r> Analysis<'r> for LoadLevels<'_, 'r> {
 
     fn judge(&mut self) {
         self.stage.warn_of_standstill();
+        self.stage.warn_of_layers();
         self.stage.warn_of_hidden_penetration();
         self.stage.warn_of_soft_stick_at_rest();
     }

@@ -1,0 +1,86 @@
+//! Stages that begin in motion: forces of joints do not swing by the start.
+
+use crate::random::Random;
+use crate::scenes::{list, simulate};
+use beamsim_core::tensor::Vec3;
+
+/// Two bodies on joints, one to the ground and one between them, with gravity; random places, axes and inertia.
+fn mechanism(random: &mut Random, spins: bool) -> String {
+    let near = |random: &mut Random, x: f64| list(Vec3([x, 0.0, 0.0]) + random.cube(0.2));
+    let joint = |random: &mut Random, nodes: &str, at: &str| {
+        let axis = random.direction();
+        let kind = ["revolute", "spherical", "universal"][random.range(0.0, 3.0) as usize];
+        let axis = match kind {
+            "revolute" => format!("axis = {}\n", list(axis)),
+            "universal" => {
+                format!("axes = [{}, {}]\n", list(axis), list(axis.cross(random.direction()).normalized().unwrap()))
+            }
+            _ => String::new(),
+        };
+        format!("[[joint]]\nkind = \"{kind}\"\nnodes = {nodes}\nat = {at}\n{axis}")
+    };
+    let [a, b, pin] = [0.5, 1.5, 1.0].map(|x| near(random, x));
+    let joints = joint(random, "[\"A\"]", "[0, 0, 0]") + &joint(random, "[\"A\", \"B\"]", &pin);
+    let initial = |random: &mut Random, node: &str| {
+        format!("[[initial]]\nat = \"{node}\"\nspin = {}\n", list(random.direction() * 3.0))
+    };
+    let motion = if spins { initial(random, "A") + &initial(random, "B") } else { String::new() };
+    format!(
+        "gravity = [0, 0, -10]\n[point]\nA = {a}\nB = {b}\n[[body]]\nat = \"A\"\nmass = 2\ninertia = [0.1, 0.2, 0.25]\n\
+         [[body]]\nat = \"B\"\nmass = 1\ninertia = [0.1, 0.15, 0.2]\n{joints}{motion}[output]\nnodes = [\"A\"]\ncolumns = [\"reaction\"]\n"
+    )
+}
+
+fn stages(scheme: &str, step: f64, ends: &[f64]) -> String {
+    let stage =
+        |end: &f64| format!("[[stage]]\nkind = \"dynamic\"\nend = {end}\nstep = {step}\nscheme = \"{scheme}\"\n");
+    ends.iter().map(stage).collect()
+}
+
+/// The largest error of the forces on the ground at multiples of 0.02 from 0.02 on, over the largest of them; `exact`
+/// has steps of 0.0025.
+fn error(deck: &str, scheme: &str, step: f64, ends: &[f64], exact: &[Vec<f64>; 3]) -> f64 {
+    let run = simulate(&format!("{deck}{}", stages(scheme, step, ends)));
+    let stride = (0.02 / step).round() as usize;
+    let (mut off, mut size) = (0.0_f64, 0.0_f64);
+    for (name, exact) in ["A.fx", "A.fy", "A.fz"].into_iter().zip(exact) {
+        for (k, force) in run.column(name).iter().step_by(stride).enumerate().skip(1) {
+            off = off.max((force - exact[8 * k]).abs());
+            size = size.max(exact[8 * k].abs());
+        }
+    }
+    off / size
+}
+
+fn exact(deck: &str) -> [Vec<f64>; 3] {
+    let run = simulate(&format!("{deck}{}", stages("lobatto", 0.0025, &[0.6])));
+    ["A.fx", "A.fy", "A.fz"].map(|name| run.column(name))
+}
+
+const SCHEMES: [&str; 4] = ["generalized_alpha", "lie_generalized_alpha", "hht", "newmark"];
+
+#[test]
+fn a_motion_goes_on_from_stage_to_stage() {
+    let mut random = Random::new(7);
+    for number in 0..8 {
+        let deck = mechanism(&mut random, false);
+        let exact = exact(&deck);
+        for scheme in SCHEMES {
+            let [one, two] = [&[0.6][..], &[0.3, 0.6]].map(|ends| error(&deck, scheme, 0.01, ends, &exact));
+            assert!(two < 1.5 * one + 1e-3, "scene {number}, {scheme}: {one} in one stage, {two} in two\n{deck}");
+        }
+    }
+}
+
+#[test]
+fn forces_of_joints_that_begin_in_motion_are_of_second_order() {
+    let mut random = Random::new(8);
+    for number in 0..8 {
+        let deck = mechanism(&mut random, true);
+        let exact = exact(&deck);
+        for scheme in SCHEMES {
+            let [coarse, fine] = [0.01, 0.005].map(|step| error(&deck, scheme, step, &[0.6], &exact));
+            assert!(fine < 0.35 * coarse + 1e-5, "scene {number}, {scheme}: {coarse} and {fine}\n{deck}");
+        }
+    }
+}
