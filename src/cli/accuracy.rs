@@ -218,11 +218,10 @@ fn meshes(found: &Meshes) -> ReachedMeshes {
 /// The message about an accuracy that was not reached.
 fn missed(found: &Found, wanted: &Accuracy) -> String {
     let (column, estimate) = found.worst(wanted);
-    let why = match found.jump {
-        None => "",
-        Some(_) => {
-            "; cables that become taut within steps cost accuracy: try `adaptive = true` with a small `step_tolerance`"
-        }
+    let why = if found.jump.is_some() {
+        "; cables that become taut within steps cost accuracy: adaptive steps with a small `step_tolerance` find each change"
+    } else {
+        ""
     };
     format!(
         "an error of {:e} of `{column}` was not reached; the best estimate is {estimate:.1e}, with {}{why}",

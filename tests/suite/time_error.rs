@@ -368,16 +368,17 @@ fn cables_that_become_taut_within_steps_are_in_the_estimate() {
                 let error = run.column("m.z").iter().enumerate().map(off).fold(0.0, f64::max);
                 let Largest { displacement, .. } = run.counters.findings.time_errors[0].largest;
                 let ratio = displacement / error;
-                // The sign of each error is that of chance, and beyond the size of the motion the estimate grows on.
+                // Errors of successive changes add up or cancel by chance, and beyond the size of the motion the
+                // estimate grows on.
                 assert!(
-                    ratio > 0.3 && (ratio < 20.0 || displacement > 0.3),
+                    ratio > 0.12 && (ratio < 30.0 || displacement > 0.3),
                     "{scheme}, {damping}, {step}: {displacement} for {error}"
                 );
                 of_all += ratio.ln() / 6.0;
                 least = f64::min(least, ratio);
             }
             assert!(
-                (0.5..5.0).contains(&f64::exp(of_all)),
+                (0.4..5.0).contains(&f64::exp(of_all)),
                 "{scheme}, {damping}: {} (at least {least})",
                 f64::exp(of_all)
             );

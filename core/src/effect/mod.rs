@@ -208,13 +208,20 @@ pub struct Roles<'a> {
     /// Contacts, with a memory from one converged state to the next
     pub(crate) contacts: Option<&'a dyn Contacts>,
     /// Forces that jump
-    pub(crate) jumps: Option<&'a dyn Jumps>,
+    pub(crate) force_jumps: Option<&'a dyn ForceJumps>,
 }
 
 impl Roles<'_> {
     /// No role beside forces.
-    pub const NONE: Self =
-        Self { constraint: None, stresses: None, masses: None, driven: None, spins: None, contacts: None, jumps: None };
+    pub const NONE: Self = Self {
+        constraint: None,
+        stresses: None,
+        masses: None,
+        driven: None,
+        spins: None,
+        contacts: None,
+        force_jumps: None,
+    };
 }
 
 /// What jumps in a force along a motion.
@@ -228,9 +235,12 @@ pub enum ForceJump {
 
 /// The role of effects whose forces jump, or change their slope at once, where the motion passes
 /// some place.
-pub trait Jumps {
-    /// What has jumped between two states.
-    fn jumped(&self, from: &State, to: &State) -> Option<ForceJump>;
+pub trait ForceJumps {
+    /// True if something acts in a state whose force may jump.
+    fn acts(&self, at: &State) -> bool;
+
+    /// What has jumped within a time step of some length.
+    fn jumped(&self, from: &State, to: &State, length: f64) -> Option<ForceJump>;
 
     /// Shows by slot what the mean of the forces at both ends of a time step of some length misses
     /// where a force has jumped: the mean force over the step less that mean (internal, spatial).
@@ -289,7 +299,9 @@ pub trait StressPoints {
 /// The bending of a beam at an integration point.
 #[derive(Clone, Copy, Debug)]
 pub struct Bending {
-    /// The nodes at the ends of its element
+    /// Its element in the scene
+    pub(crate) element: u32,
+    /// The nodes at the ends of the element
     pub(crate) ends: [Node; 2],
     /// The length that the point stands for
     pub(crate) length: f64,

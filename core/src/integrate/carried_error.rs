@@ -82,8 +82,8 @@ pub(super) struct CarriedError {
     /// The factor that scales the error to [`SCALED_ERROR`]; zero while there is no error
     scaling: f64,
     known: Known,
-    /// What the means of forces at both ends of the last steps have missed where forces jumped, by
-    /// slot (internal, spatial), and has not yet acted on the error
+    /// The impulses that the means of forces at both ends of the last steps have missed where forces
+    /// jumped, by slot (internal, spatial), and that have not yet acted on the error
     missed: Vec<(Slot, Vec3)>,
     /// True if forces have jumped
     has_jumped: bool,
@@ -290,8 +290,10 @@ impl CarriedError {
         // The solver sums the forces of all categories: those of the others are subtracted from the
         // forces on the error.
         const INERTIA: usize = Category::Inertia as usize;
-        for (slot, missed) in self.missed.drain(..) {
-            self.force[INERTIA][slot as usize] += missed;
+        // Internal forces act against the true motion, and so against the error, which is the true motion
+        // less that of the steps.
+        for &(slot, impulse) in &self.missed {
+            self.force[INERTIA][slot as usize] -= impulse * (1.0 / self.step.length);
         }
         threads::each_part(&mut self.force[INERTIA], |start, part| {
             for (slot, force) in (start..).zip(part) {
@@ -332,10 +334,14 @@ impl CarriedError {
         }
     }
 
-    /// Takes over what the means of forces at both ends of the step have missed, by slot.
+    /// Takes over what the means of forces at both ends of the step have missed, by slot. What was
+    /// missed before acts no more once it is in the error.
     pub fn miss(&mut self, missed: Vec<(Slot, Vec3)>) {
+        if self.known == Known::Error {
+            self.missed.clear();
+        }
         self.has_jumped |= !missed.is_empty();
-        self.missed.extend(missed);
+        self.missed.extend(missed.into_iter().map(|(slot, force)| (slot, force * self.step.length)));
     }
 
     /// Ends a step between two states in one chart, with the `error` that [`Self::solve`] has

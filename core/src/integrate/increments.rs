@@ -47,10 +47,10 @@ impl Increments {
         Self { carriers: model.charted(kind).rotations.iter().map(carrier).collect() }
     }
 
-    /// Starts a stage, after [`super::Scheme::start`]: the algorithmic rates of momenta begin as
-    /// those of the state `ahead`, in which the motion will be after `lag` steps, and those of the
-    /// step before as if momenta had gone on as they do from the state to that one.
-    pub fn start(&self, state: &mut State, ahead: Option<(&State, f64)>) {
+    /// Starts a stage, after [`super::Scheme::start`]: the algorithmic rates of momenta begin as the
+    /// true ones. Those of rotations that joints hold begin as the true ones `at_lag`, if given, and
+    /// those of the step before as if momenta went on alike from there.
+    pub fn start(&self, state: &mut State, at_lag: Option<AtLag>) {
         for &(slot, carrier) in &self.carriers {
             let rate = |state: &State| {
                 let spin = state.spin(slot);
@@ -59,8 +59,8 @@ impl Increments {
             let k = slot as usize;
             let now = rate(state);
             (state.algorithmic[k], state.earlier[k]) = (now, now);
-            if let Some((ahead, lag)) = ahead {
-                let then = rate(ahead);
+            if let Some(AtLag { state: there, lag, .. }) = at_lag.filter(|at_lag| at_lag.jerk[k] != Vec3::ZERO) {
+                let then = rate(there);
                 (state.algorithmic[k], state.earlier[k]) = (then, now - (then - now) * (1.0 / lag));
             }
         }
@@ -155,6 +155,17 @@ impl Increments {
     }
 }
 
+/// The time to which algorithmic accelerations belong at the start of a stage.
+#[derive(Clone, Copy)]
+pub struct AtLag<'a> {
+    /// The state at that time
+    pub state: &'a State,
+    /// The time from the start, in steps
+    pub lag: f64,
+    /// Third rates that keep the gaps of joints closed, by slot; zero where joints hold nothing
+    pub jerk: &'a [Vec3],
+}
+
 /// The angular acceleration of a rotation by its causes, spatial.
 pub struct Accelerations {
     /// The slot of the rotation
@@ -163,9 +174,9 @@ pub struct Accelerations {
     pub(crate) driven: Vec3,
     /// phi: the part by the spin itself, without moments
     pub(crate) free: Vec3,
-    /// A twelfth of the rate of phi by moments, which steps leave out: they take phi at their end for
-    /// that of the momentum of their start. With beta - 1/6 + (alpha_m - alpha_f)/2 times mu' it is
-    /// what spins of steps lead those of a smooth motion by, over h^2
+    /// -(1/12) dphi/dOmega mu = (1/12) E J^-1 (mu x J Omega + Omega x J mu) with material mu: steps take
+    /// phi at their end from the momentum of their start, and so leave out how moments change phi. The
+    /// spins of smooth steps are those of the motion less h^2 [(beta - 1/6 + (alpha_m - alpha_f)/2) mu' + this]
     pub(crate) lead: Vec3,
     /// The spin, material
     pub(crate) spin: Vec3,

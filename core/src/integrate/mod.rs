@@ -9,7 +9,7 @@ mod predictor;
 mod time_error;
 
 pub use alpha::{Rotations, Scheme, Stages, Step};
-pub use increments::{Accelerations, Increments};
+pub use increments::{Accelerations, AtLag, Increments};
 pub use lobatto::{Lobatto, MIDDLE, Stage};
 pub use predictor::Predictor;
 pub use time_error::{Largest, StepEnds, TimeError};

@@ -169,7 +169,7 @@ impl TimeError {
             longest: None,
             sum: Largest::default(),
             // In linear stages nothing does.
-            sees_jumps: assembly.origin().is_none() && model.jumps().next().is_some(),
+            sees_jumps: assembly.origin().is_none() && model.force_jumps().any(|effect| effect.acts(state)),
             carried: None,
         };
         // The sum of local errors does not show forces that jump.

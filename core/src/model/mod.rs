@@ -30,7 +30,7 @@ pub use section::{MassPerLength, SectionMatrices};
 pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError, SurfaceJump};
 
 use crate::effect::joint::nearest_angle;
-use crate::effect::{Constraint, Contacts, Effect, Energy, Jumps, Momentum, MotorState};
+use crate::effect::{Constraint, Contacts, Effect, Energy, ForceJumps, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
 use crate::system::{Category, DofMap, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System, most_regions};
 use crate::tensor::Vec3;
@@ -239,15 +239,16 @@ impl Model {
     }
 
     /// The effects whose forces jump.
-    pub fn jumps(&self) -> impl Iterator<Item = &dyn Jumps> {
-        self.effects.iter().filter_map(|effect| effect.roles().jumps)
+    pub fn force_jumps(&self) -> impl Iterator<Item = &dyn ForceJumps> {
+        self.effects.iter().filter_map(|effect| effect.roles().force_jumps)
     }
 
     /// What the means of forces at both ends of a step of some length miss where forces jump, by
-    /// slot; see [`Jumps::missed`].
+    /// slot; see [`ForceJumps::missed`].
     pub fn missed(&self, from: &State, to: &State, length: f64) -> Vec<(Slot, Vec3)> {
         let mut missed = Vec::new();
-        self.jumps().for_each(|effect| effect.missed(from, to, length, &mut |slot, force| missed.push((slot, force))));
+        self.force_jumps()
+            .for_each(|effect| effect.missed(from, to, length, &mut |slot, force| missed.push((slot, force))));
         missed
     }
 

@@ -23,19 +23,19 @@ const RESOLVING: f64 = 4.0;
 /// scene, from which on it is told.
 const TOLD_CHANGE: f64 = 0.25;
 
-/// The largest bend, in radians over the length of an element, that is none.
+/// The largest bend, in radians over the length that an integration point stands for, that is none.
 const NO_BEND: f64 = 1e-9;
 
 impl Bending {
-    /// The bending stiffness about the axis of the bending moment; zero without a moment.
-    fn against_bending(&self) -> f64 {
-        let across = self.moment - self.tangent * self.moment.dot(self.tangent);
-        across.normalized().map_or(0.0, |axis| axis.dot(self.stiffness * axis))
+    /// The part of a moment that bends.
+    fn across(&self, moment: Vec3) -> Vec3 {
+        moment - self.tangent * moment.dot(self.tangent)
     }
 
-    /// The length over which bending of some stiffness decays; infinite without tension.
-    fn decay(&self, stiffness: f64) -> f64 {
-        if self.tension > 0.0 { (stiffness / self.tension).sqrt() } else { f64::INFINITY }
+    /// The length over which its bending decays; `None` without tension or bending.
+    fn decay(&self) -> Option<f64> {
+        let axis = self.across(self.moment).normalized()?;
+        (self.tension > 0.0).then(|| (axis.dot(self.stiffness * axis) / self.tension).sqrt())
     }
 
     /// True if bending about the softest axis would not be resolved.
@@ -45,11 +45,12 @@ impl Bending {
         let b = self.tangent.cross(a);
         let [aa, ab, bb] = [(a, a), (a, b), (b, b)].map(|(x, y)| x.dot(self.stiffness * y));
         let softest = 0.5 * (aa + bb) - (0.25 * (aa - bb) * (aa - bb) + ab * ab).sqrt();
-        self.length > UNRESOLVED * self.decay(softest.max(0.0))
+        self.tension > 0.0 && self.length > UNRESOLVED * (softest.max(0.0) / self.tension).sqrt()
     }
 }
 
 /// A place at which bending is not resolved.
+#[derive(Clone, Copy)]
 pub(super) struct Unresolved {
     /// The node nearest to it
     node: Node,
@@ -57,31 +58,56 @@ pub(super) struct Unresolved {
     decay: f64,
     /// The distance of integration points
     spacing: f64,
-    /// The change of the moment between these
+    /// The change of the bending moment between these
     change: f64,
 }
 
-impl Unresolved {
-    /// The place with the largest change of the moment; `points` stand element by element.
-    pub(super) fn worst(points: &[Bending]) -> Option<Self> {
-        let largest = points.iter().map(|point| point.moment.norm()).fold(0.0, f64::max);
-        let bends = points.iter().any(|point| point.moment.norm() * point.length > NO_BEND * point.against_bending());
-        if !bends {
-            return None;
+/// A look along beams for the place at which bending is resolved least.
+#[derive(Default)]
+pub(super) struct Look {
+    /// The point before
+    last: Option<Bending>,
+    /// The largest bending moment so far
+    largest: f64,
+    /// True if something bends by more than round-off
+    bends: bool,
+    /// The place with the largest change of the moment between points that are too far apart
+    worst: Option<Unresolved>,
+}
+
+impl Look {
+    /// Looks at the next point; points of an element follow each other, and so do elements of a beam.
+    pub(super) fn take(&mut self, point: Bending) {
+        let moment = point.across(point.moment);
+        let size = moment.norm();
+        self.largest = self.largest.max(size);
+        self.bends |= size * point.length > NO_BEND * point.stiffness.max_abs();
+        let last = self.last.replace(point);
+        let neighbour = last.filter(|last| last.element == point.element || last.ends[1] == point.ends[0]);
+        let Some((last, decay)) = neighbour.and_then(|last| Some((last, longer(last.decay(), point.decay())?))) else {
+            return;
+        };
+        let spacing = 0.5 * (last.length + point.length);
+        let change = point.across(point.moment - last.moment).norm();
+        if spacing > UNRESOLVED * decay && self.worst.is_none_or(|worst| change > worst.change) {
+            self.worst = Some(Unresolved { node: last.ends[1], decay, spacing, change });
         }
-        let pairs = points.windows(2).filter(|pair| pair[0].ends[1] == pair[1].ends[0] || pair[0].ends == pair[1].ends);
-        let places = pairs.map(|pair| Self {
-            node: pair[0].ends[1],
-            decay: pair.iter().map(|point| point.decay(point.against_bending())).fold(0.0, f64::max),
-            spacing: 0.5 * (pair[0].length + pair[1].length),
-            change: (pair[0].moment - pair[1].moment).norm(),
-        });
-        let is_told = |place: &Self| place.change > TOLD_CHANGE * largest && place.spacing > UNRESOLVED * place.decay;
-        places.filter(is_told).max_by(|a, b| a.change.total_cmp(&b.change))
     }
 
+    /// The place that is to be told.
+    pub(super) fn found(self) -> Option<Unresolved> {
+        self.worst.filter(|worst| self.bends && worst.change > TOLD_CHANGE * self.largest)
+    }
+}
+
+/// The longer of two lengths of decay; `None` if both are.
+fn longer(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    a.into_iter().chain(b).reduce(f64::max)
+}
+
+impl Unresolved {
     /// The message about it, for a `subject` such as a stage.
-    pub(super) fn message(&self, subject: &str, model: &Model) -> String {
+    fn message(&self, subject: &str, model: &Model) -> String {
         let Self { node, decay, spacing, .. } = self;
         let name = model.node_at(node.u as usize);
         let elements = RESOLVING * decay;
@@ -94,40 +120,56 @@ impl Unresolved {
 }
 
 impl StageRun<'_> {
-    /// The bending at all integration points in the present state.
-    pub(super) fn bending(&self) -> Vec<Bending> {
-        let mut points = Vec::new();
-        self.assembly.each_bending(self.state, self.assembly.origin(), &mut |point| points.push(point));
-        points
+    /// True if bending under the tensions of the present state may decay over less than elements
+    /// resolve.
+    pub(super) fn may_have_layers(&self) -> bool {
+        let mut may = false;
+        self.assembly.each_bending(self.state, self.assembly.origin(), &mut |point| may |= point.may_be_unresolved());
+        may
     }
 
-    /// The bending at all integration points that a field of increments adds to the present state.
-    pub(super) fn bending_along(&self, field: &[Vec3]) -> Vec<Bending> {
+    /// The place at which the bending that a field of increments adds to the present state is
+    /// resolved least.
+    pub(super) fn unresolved_along(&self, field: &[Vec3]) -> Option<Unresolved> {
         let about = self.assembly.origin().unwrap_or(self.state);
-        let mut moved = about.clone();
         // So that no unknown is larger than one: a rotation, or a displacement over the length of the scene.
         let size = |(&change, kind): (&Vec3, &SlotKind)| match kind {
             SlotKind::Displacement | SlotKind::Sliding => change.norm() / self.model.length,
             SlotKind::Rotation | SlotKind::Force | SlotKind::Moment => change.norm(),
         };
         let largest = field.iter().zip(self.model.kinds.iter()).map(size).fold(0.0, f64::max);
+        if largest == 0.0 {
+            return None;
+        }
+        let mut moved = about.clone();
         moved.q.iter_mut().zip(field).for_each(|(q, &change)| *q += change * (1.0 / largest));
         let mut points = Vec::new();
         self.assembly.each_bending(about, Some(about), &mut |point| points.push(point));
-        let mut number = 0;
+        let mut points = points.into_iter();
+        let mut look = Look::default();
         self.assembly.each_bending(&moved, Some(about), &mut |with| {
-            points[number].moment = with.moment - points[number].moment;
-            number += 1;
+            if let Some(point) = points.next() {
+                look.take(Bending { moment: with.moment - point.moment, ..point });
+            }
         });
-        points
+        look.found()
     }
 
-    /// Warns of bending that decays over less than elements resolve.
+    /// Warns of bending that decays over less than elements resolve, once in a run.
     pub(super) fn warn_of_layers(&mut self) {
-        let Some(place) = Unresolved::worst(&self.bending()) else { return };
-        if !std::mem::replace(&mut self.issued.layers, true) {
-            let message = place.message(&format!("stage {}", self.number + 1), self.model);
-            self.warn(WarningKind::CoarseLayer, message);
+        if self.issued.layers {
+            return;
         }
+        let mut look = Look::default();
+        self.assembly.each_bending(self.state, self.assembly.origin(), &mut |point| look.take(point));
+        if let Some(place) = look.found() {
+            self.warn_of_layer(&place, &format!("stage {}", self.number + 1));
+        }
+    }
+
+    /// Warns of a place at which bending of a `subject` is not resolved.
+    pub(super) fn warn_of_layer(&mut self, place: &Unresolved, subject: &str) {
+        self.issued.layers = true;
+        self.warn(WarningKind::CoarseLayer, place.message(subject, self.model));
     }
 }

@@ -44,7 +44,7 @@ pub struct Counters {
     pub cutbacks: u64,
     /// Mixed elements, summed over converged states
     pub mixed_elements: u64,
-    /// What has jumped within levels or steps, where cables became slack or taut
+    /// What has jumped within time steps, where cables became slack or taut
     pub jump: Option<ForceJump>,
     /// Augmentations and changes of contacts
     pub contacts: ContactCounters,

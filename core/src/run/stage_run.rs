@@ -191,10 +191,13 @@ impl StageRun<'_> {
         Ok(())
     }
 
-    /// Notes what has jumped since the last accepted state. In linear stages a cable stays as it is.
+    /// Notes what has jumped within a time step that is accepted. In linear stages a cable stays as it
+    /// is.
     fn look_for_jumps(&mut self) {
-        if !self.is_linear() {
-            let jumped = self.model.jumps().filter_map(|effect| effect.jumped(self.good, self.state)).max();
+        let length = self.state.time - self.good.time;
+        if length > 0.0 && !self.is_linear() {
+            let effects = self.model.force_jumps();
+            let jumped = effects.filter_map(|effect| effect.jumped(self.good, self.state, length)).max();
             self.counters.jump = self.counters.jump.max(jumped);
         }
     }

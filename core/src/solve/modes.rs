@@ -114,8 +114,8 @@ pub struct ModeShape {
     pub(crate) unknowns: Vec<f64>,
     /// Modal mass x . M x
     pub(crate) mass: f64,
-    /// True if the problem is undamped and symmetric, and the frequency has lost digits, which the
-    /// shape tells
+    /// True if the problem is undamped and symmetric, and the frequency has lost digits, which can be
+    /// found from the shape
     pub(crate) is_lossy: bool,
 }
 
@@ -221,8 +221,8 @@ impl Matrices {
 
 impl<'a> ModeSearch<'a> {
     /// From here on motions have their shapes.
-    pub fn keep_shapes(&mut self, keeps: bool) {
-        self.keeps_shapes = keeps;
+    pub fn keep_shapes(&mut self) {
+        self.keeps_shapes = true;
     }
 
     /// Search with these matrices, in the space orthogonal to the `rigid` motions. `scales` are those

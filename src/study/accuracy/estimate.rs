@@ -145,6 +145,21 @@ impl ErrorShare {
         Self { largest: f64::INFINITY, largest_of_coarser: f64::INFINITY, ..Self::none(columns) }
     }
 
+    /// Raises the share of a mesh that does not resolve bending so that it is not enough: such meshes
+    /// hardly differ from each other. The next one should have more than twice the elements.
+    pub fn raise_unresolved(&mut self, order: usize) {
+        let least = 2.0_f64.powf(order as f64 + 1.0);
+        for (largest, columns) in
+            [(&mut self.largest, &mut self.columns), (&mut self.largest_of_coarser, &mut self.columns_of_coarser)]
+        {
+            if *largest < least {
+                let factor = least / *largest;
+                columns.iter_mut().filter(|_| factor.is_finite()).for_each(|column| *column *= factor);
+                *largest = least;
+            }
+        }
+    }
+
     /// The error of the coarser run of the comparison.
     pub fn of_coarser(&self) -> Self {
         Self { largest: self.largest_of_coarser, columns: self.columns_of_coarser.clone(), ..self.clone() }

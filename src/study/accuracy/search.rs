@@ -418,13 +418,14 @@ impl<'a> Search<'a> {
         }
         let step = self.share_of_steps(round, trials);
         let (mut mesh, mut remeshed) = self.shares_of_meshes(round, trials);
-        // Meshes that do not resolve bending hardly differ from each other.
-        let unresolved = 2.0_f64.powf(self.family.order.unwrap_or(1) as f64 + 1.0);
-        let shares = [(Some(&mut mesh), Some(&trials.own)), (remeshed.as_mut(), trials.remeshed.as_ref())];
-        for (share, trial) in shares {
-            if let Some((share, _)) = share.zip(trial.filter(|trial| trial.has_coarse_layers)) {
-                share.largest = share.largest.max(unresolved);
-            }
+        let order = self.family.order.unwrap_or(1);
+        if trials.own.has_coarse_layers {
+            mesh.raise_unresolved(order);
+        }
+        if let Some(share) =
+            remeshed.as_mut().filter(|_| trials.remeshed.as_ref().is_some_and(|run| run.has_coarse_layers))
+        {
+            share.raise_unresolved(order);
         }
         Estimates { own: Estimate { mesh, step }, remeshed }
     }

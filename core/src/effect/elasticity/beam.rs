@@ -545,6 +545,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         let ends = [nodes[0], nodes[N - 1]];
         for (point, (_, stress)) in self.points().iter().zip(self.strains_and_stresses::<I>(at, origin)) {
             show(Bending {
+                element: self.connection.element,
                 ends,
                 length: point.weight,
                 moment: stress.m,

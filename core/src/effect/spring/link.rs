@@ -4,7 +4,7 @@
 //! n = (x_b - x_a)/l,   F = k (l - l0) + c dl/dt,   f_b = F n = -f_a
 //! ```
 
-use crate::effect::{Effect, Energy, ForceJump, Jumps, Roles, TangentForm};
+use crate::effect::{Effect, Energy, ForceJump, ForceJumps, Roles, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
 use crate::scalar::Real;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Slot, State};
@@ -115,14 +115,19 @@ impl Link {
         [d, rate]
     }
 
-    /// What the mean of the forces at both ends misses, see [`Jumps::missed`]; `None` where the
+    /// True for a cable that is neither slack nor taut all the time between two states.
+    fn changes(&self, from: &State, to: &State, length: f64) -> bool {
+        let is_slack = |part: f64| self.is_slack(self.within([from, to], length, part)[0]);
+        self.tension_only && [0.5, 1.0].into_iter().any(|part| is_slack(part) != is_slack(0.0))
+    }
+
+    /// What the mean of the forces at both ends misses, see [`ForceJumps::missed`]; `None` where the
     /// cable is slack all the time, or taut.
     fn missed(&self, from: &State, to: &State, length: f64) -> Option<Vec3> {
-        let at = |part: f64| self.within([from, to], length, part);
-        let is_slack = [0.0, 0.5, 1.0].map(|part| self.is_slack(at(part)[0]));
-        if is_slack == [true; 3] || is_slack == [false; 3] {
+        if !self.changes(from, to, length) {
             return None;
         }
+        let at = |part: f64| self.within([from, to], length, part);
         let part = |k: usize| (k as f64 + 0.5) / PARTS as f64;
         let sum = (0..PARTS).fold(Vec3::ZERO, |sum, k| sum + self.force(at(part(k))));
         Some(sum * (1.0 / PARTS as f64) - (self.force(at(0.0)) + self.force(at(1.0))) * 0.5)
@@ -207,14 +212,17 @@ impl Effect for Links {
 
     fn roles(&self) -> Roles<'_> {
         let has_cables = self.links.iter().any(|link| link.tension_only);
-        Roles { jumps: has_cables.then_some(self as &dyn Jumps), ..Roles::NONE }
+        Roles { force_jumps: has_cables.then_some(self as &dyn ForceJumps), ..Roles::NONE }
     }
 }
 
-impl Jumps for Links {
-    fn jumped(&self, from: &State, to: &State) -> Option<ForceJump> {
-        let has_changed = |link: &&Link| link.is_slack(link.between(from).0) != link.is_slack(link.between(to).0);
-        let changed = self.acting(to).filter(has_changed);
+impl ForceJumps for Links {
+    fn acts(&self, at: &State) -> bool {
+        self.acting(at).any(|link| link.tension_only)
+    }
+
+    fn jumped(&self, from: &State, to: &State, length: f64) -> Option<ForceJump> {
+        let changed = self.acting(to).filter(|link| link.changes(from, to, length));
         changed.map(|link| if link.damping == 0.0 { ForceJump::Slope } else { ForceJump::Force }).max()
     }
 

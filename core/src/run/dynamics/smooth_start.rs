@@ -16,7 +16,7 @@
 //! is integrated to a higher order: see [`Accelerations`](crate::integrate::Accelerations).
 
 use super::Dynamics;
-use crate::integrate::{Increments, Stages, Step};
+use crate::integrate::{AtLag, Increments, Stages, Step};
 use crate::kernel::Weights;
 use crate::rotation::Rotation;
 use crate::run::failure::Failure;
@@ -32,7 +32,7 @@ pub(super) struct JointJerk {
     lead: Vec<Vec3>,
 }
 
-/// The instants, in parts of a step, whose accelerations give third rates.
+/// The instants, in parts of a step, whose accelerations give third rates; see [`slope`].
 const INSTANTS: [f64; 3] = [0.0, 0.5, 1.0];
 
 /// The rate at the first of [`INSTANTS`] of a quantity with these values, by a parabola.
@@ -51,28 +51,29 @@ impl Dynamics<'_, '_> {
         let [Some(now), Some(half), Some(whole)] = INSTANTS.map(|part| self.after(part * step)) else {
             return Ok(None);
         };
-        let ways = [&now, &half, &whole];
-        let [now, half, whole] = ways.map(|state| self.stage.assembly.drift(state)[1].clone());
+        let states = [&now, &half, &whole];
+        let [now, half, whole] = states.map(|state| self.stage.assembly.drift(state)[1].clone());
         let rates3: Vec<Vec3> = (0..now.len()).map(|slot| slope([now[slot], half[slot], whole[slot]], step)).collect();
         if rates3.iter().all(|&rate| rate == Vec3::ZERO) {
             return Ok(None);
         }
         let factor = self.settings.scheme.error_factor().unwrap_or(0.0);
-        let own = self.increments.as_ref().map(|increments| lead_of_turns(increments, ways, step, factor));
-        let Some(whole) = self.third_rates(&rates3)? else { return Ok(None) };
+        let own = self.increments.as_ref().map(|increments| lead_of_turns(increments, states, step, factor));
+        let Some(whole) = self.closing_rates(&rates3)? else { return Ok(None) };
         let lead = match own {
             None => whole.iter().map(|&rate3| rate3 * factor).collect(),
             Some(own) => {
                 let own = self.rates_of_gaps(&own);
                 let rest: Vec<Vec3> = rates3.iter().zip(own).map(|(&rate3, own)| rate3 * factor - own).collect();
-                self.third_rates(&rest)?.unwrap_or_default()
+                self.closing_rates(&rest)?.unwrap_or_default()
             }
         };
         Ok(Some(JointJerk { whole, lead }))
     }
 
-    /// Third rates of the unknowns where gaps have the third rates `gaps` without them.
-    fn third_rates(&mut self, gaps: &[Vec3]) -> Result<Option<Vec<Vec3>>, Failure> {
+    /// Rates of the unknowns that keep gaps closed, with the least motion that mass allows, where the
+    /// gaps have the rates `gaps` without them; all of one order, say third rates.
+    fn closing_rates(&mut self, gaps: &[Vec3]) -> Result<Option<Vec<Vec3>>, Failure> {
         self.stage.assembly.evaluate(self.stage.state, Weights::MASS, None);
         self.stage.assembly.system.forget_forces();
         let solved = self.solve_with_mass(gaps)?;
@@ -117,19 +118,19 @@ impl Dynamics<'_, '_> {
         scheme.start(state, length, whole);
         let Some(increments) = &self.increments else { return };
         let lag = scheme.lag();
-        let ahead = whole.filter(|_| lag != 0.0).map(|whole| {
-            let mut ahead = State::clone(state);
-            advance(&mut ahead, lag * length, Some(whole));
-            ahead
+        let at_lag = whole.filter(|_| lag != 0.0).map(|whole| {
+            let mut at_lag = State::clone(state);
+            advance(&mut at_lag, lag * length, Some(whole));
+            (at_lag, whole)
         });
-        increments.start(state, ahead.as_ref().map(|ahead| (ahead, lag)));
+        increments.start(state, at_lag.as_ref().map(|(state, jerk)| AtLag { state, lag, jerk }));
     }
 
     /// Changes the velocities of the start to those that fixed steps of the scheme keep along a
     /// motion with third rates. After adaptive steps velocities are given back to the joints.
     pub(super) fn lead_velocities(&mut self, jerk: Option<&JointJerk>) {
         let Some(jerk) = jerk.filter(|_| self.settings.adaptive.is_none()) else { return };
-        let length = self.first_step().length;
+        let (_, length) = self.grid_from(self.stage.state.time).step(1);
         let velocities = self.stage.state.v.iter_mut().zip(&jerk.lead);
         velocities.for_each(|(v, &lead)| *v -= lead * (length * length));
     }

@@ -47,6 +47,7 @@ impl Dynamics<'_, '_> {
         }
         self.stage.open_account()?;
         self.open_guard();
+        // Behind the first row and the account, which have the true velocities.
         self.lead_velocities(jerk.as_ref());
         Ok(())
     }

@@ -9,10 +9,8 @@ pub(super) use vibrations::{Vibrations, pivots_tell, vibrations};
 use self::rigid::{free_spins, rigid_motions};
 use self::search::{Found, find_modes, first_shift, grows, matrices};
 use super::failure::Failure;
-use super::layers::Unresolved;
 use super::results::{Mode, StageResult};
 use super::stage_run::{Analysis, StageRun, Teller};
-use crate::effect::Bending;
 use crate::model::StageError;
 use crate::solve::{Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, mechanism};
 use crate::sorting::sort_by;
@@ -118,14 +116,16 @@ impl Modal<'_, '_> {
         let mut rigid = rigid_motions(assembly, model, state, &plan.places);
         rigid.extend(free_spins(&assembly.system, model, state));
         self.refuse_massless_mechanisms(matrices)?;
-        let has_layers = self.stage.bending().iter().any(Bending::may_be_unresolved);
+        let has_layers = !self.stage.issued.layers && self.stage.may_have_layers();
         let moment = self.stage.moment();
         let StageRun { assembly, newton, observer, counters, number, plan, model, .. } = &mut *self.stage;
         let scales = model.scales(&assembly.system.pattern.dof_map);
         let mut teller = Teller { observer: &mut **observer, at: moment, number: *number, stages: plan.stages.len() };
         let shift = first_shift(matrices, &assembly.system);
         let mut search = ModeSearch::new(&mut assembly.system, &mut newton.solver, matrices, rigid, scales);
-        search.keep_shapes(has_layers);
+        if has_layers {
+            search.keep_shapes();
+        }
         let tell = &mut |done| teller.tell(done);
         let found = find_modes(&mut search, shift, self.modes, tell, &mut counters.work)?;
         self.stage.unless_interrupted()?;
@@ -163,7 +163,7 @@ impl Modal<'_, '_> {
     /// lost are there again, as far as the shape is right.
     fn refine(&mut self, motion: &mut SmallMotion) {
         let Some(ModeShape { mass, .. }) = motion.shape.as_ref().filter(|shape| shape.is_lossy) else { return };
-        let field = self.field(motion).unwrap_or_default();
+        let Some(field) = self.field(motion) else { return };
         let StageRun { assembly, state, .. } = &mut *self.stage;
         let Some(stiffness) = assembly.stiffness_along(state, &field) else { return };
         let square = -stiffness / mass;
@@ -183,16 +183,17 @@ impl Modal<'_, '_> {
         Some(field)
     }
 
-    /// Warns of the first mode whose bending decays over less than elements resolve.
+    /// Warns of the first mode whose bending decays over less than elements resolve, once in a run.
     fn warn_of_layers(&mut self, listed: &[SmallMotion]) {
-        let place = |motion: &SmallMotion| {
-            Some(self.stage.bending_along(&self.field(motion)?)).and_then(|points| Unresolved::worst(&points))
-        };
-        let Some((number, place)) = listed.iter().enumerate().find_map(|(k, motion)| Some((k, place(motion)?))) else {
+        if self.stage.issued.layers {
             return;
-        };
-        let message = place.message(&format!("stage {}, mode {}", self.stage.number + 1, number + 1), self.stage.model);
-        self.stage.warn(WarningKind::CoarseLayer, message);
+        }
+        let unresolved = |motion: &SmallMotion| self.stage.unresolved_along(&self.field(motion)?);
+        let found = listed.iter().enumerate().find_map(|(k, motion)| Some((k, unresolved(motion)?)));
+        if let Some((k, place)) = found {
+            let subject = format!("stage {}, mode {}", self.stage.number + 1, k + 1);
+            self.stage.warn_of_layer(&place, &subject);
+        }
     }
 
     fn warn_of_modes(&mut self, found: &Found, listed: &[SmallMotion]) {
