@@ -58,6 +58,10 @@ fn bending_without_layers_is_not_told() {
     let even =
         wire(2e4, 6, 2, hinge, ALONG_X).replace("[[load]]\nat = \"m\"\nforce", "[[load]]\nalong = \"wire\"\nforce");
     assert!(!is_told(&simulate(&even)));
+    // Twist does not decay.
+    let twisted = wire(2e4, 6, 2, CLAMP, ALONG_X)
+        .replace("[[load]]\nat = \"m\"\nforce = [0.0, 0.0, 4.0]", "[[load]]\nat = \"m\"\nmoment = [0.1, 0, 0]");
+    assert!(twisted.contains("moment") && !is_told(&simulate(&twisted)));
     // Compression makes no layers, and a stiff wire resolves them.
     assert!(!is_told(&simulate(&wire(-1e-3, 6, 2, CLAMP, ALONG_X))));
     assert!(!is_told(&simulate(&wire(1.0, 6, 2, CLAMP, ALONG_X))));

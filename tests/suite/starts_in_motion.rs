@@ -1,7 +1,7 @@
 //! Stages that begin in motion: forces of joints do not swing by the start.
 
 use crate::random::Random;
-use crate::scenes::{list, simulate};
+use crate::scenes::{distance, list, simulate};
 use beamsim_core::tensor::Vec3;
 
 /// Two bodies on joints, one to the ground and one between them, with gravity; random places, axes and inertia.
@@ -70,6 +70,34 @@ fn a_motion_goes_on_from_stage_to_stage() {
             assert!(two < 1.5 * one + 1e-3, "scene {number}, {scheme}: {one} in one stage, {two} in two\n{deck}");
         }
     }
+}
+
+#[test]
+fn motions_go_on_where_rows_shorten_steps() {
+    let deck = mechanism(&mut Random::new(9), true).replace("[output]\n", "[output]\ninterval = 0.02\n");
+    // Steps of 0.011 are taken as steps of 0.01.
+    let [wanted, taken] = [0.011, 0.01].map(|step| {
+        let run = simulate(&format!("{deck}{}", stages("newmark", step, &[0.3, 0.6])));
+        ["A.fx", "A.fy", "A.fz"].map(|name| run.column(name))
+    });
+    for (wanted, taken) in wanted.iter().zip(&taken) {
+        let off = wanted.iter().zip(taken).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let size = taken.iter().fold(0.0, |size: f64, force| size.max(force.abs()));
+        assert!(off < 1e-4 * size, "{off} of {size}");
+    }
+}
+
+#[test]
+fn a_free_body_beside_a_mechanism_keeps_its_momentum() {
+    let free = "[point.F]\nat = [0, 5, 0]\n[[body]]\nat = \"F\"\nmass = 1\ninertia = [1, 2, 3]\n[[initial]]\nat = \"F\"\nspin = [0.3, 5, 0.2]\n";
+    let free = free.replace("[point.F]\nat = [0, 5, 0]\n", "");
+    let beside = mechanism(&mut Random::new(10), true)
+        .replace("[[body]]\nat = \"A\"", &format!("F = [0, 5, 0]\n{free}[[body]]\nat = \"A\""));
+    let alone = format!("[point]\nF = [0, 5, 0]\n{free}[output]\nnodes = [\"F\"]\ncolumns = [\"w\"]\n");
+    let [beside, alone] =
+        [beside.replace("nodes = [\"A\"]\ncolumns = [\"reaction\"]", "nodes = [\"F\"]\ncolumns = [\"w\"]"), alone]
+            .map(|deck| simulate(&format!("{deck}{}", stages("lie_generalized_alpha", 0.02, &[0.6]))).vector("F.w"));
+    assert!(distance(beside, alone) < 1e-9, "{beside:?} for {alone:?}");
 }
 
 #[test]

@@ -44,7 +44,7 @@ impl Dynamics<'_, '_> {
     /// The third rates at the start of the stage; `None` without joints, and where only their forces
     /// change.
     pub(super) fn jerk_of_joints(&mut self) -> Result<Option<JointJerk>, Failure> {
-        let step = self.settings.step;
+        let step = self.first_length();
         if self.stage.model.multipliers.is_empty() || self.settings.scheme.stages == Stages::MiddleAndEnd {
             return Ok(None);
         }
@@ -69,6 +69,15 @@ impl Dynamics<'_, '_> {
             }
         };
         Ok(Some(JointJerk { whole, lead }))
+    }
+
+    /// The length of the first step: fixed ones are shorter where rows or the end of the stage ask for
+    /// it.
+    fn first_length(&self) -> f64 {
+        match self.settings.adaptive {
+            Some(_) => self.settings.step,
+            None => self.grid_from(self.stage.state.time).step(1).1,
+        }
     }
 
     /// Rates of the unknowns that keep gaps closed, with the least motion that mass allows, where the
@@ -130,7 +139,7 @@ impl Dynamics<'_, '_> {
     /// motion with third rates. After adaptive steps velocities are given back to the joints.
     pub(super) fn lead_velocities(&mut self, jerk: Option<&JointJerk>) {
         let Some(jerk) = jerk.filter(|_| self.settings.adaptive.is_none()) else { return };
-        let (_, length) = self.grid_from(self.stage.state.time).step(1);
+        let length = self.first_length();
         let velocities = self.stage.state.v.iter_mut().zip(&jerk.lead);
         velocities.for_each(|(v, &lead)| *v -= lead * (length * length));
     }
