@@ -112,3 +112,34 @@ fn forces_of_joints_that_begin_in_motion_are_of_second_order() {
         }
     }
 }
+
+/// A body on a hinge about z, at (2, 1, 0) from it, that turns at 1 rad/s in a stage before `more` acts on it.
+fn hinged(scheme: &str, spin: f64, more: &str) -> String {
+    format!(
+        "[point]\ng = [0, 0, 0]\nd = [2, 1, 0]\n[[body]]\nat = \"g\"\nmass = 1\ninertia = [1, 1, 1]\n[[support]]\nat = \"g\"\nfix = \"all\"\n\
+         [[body]]\nat = \"d\"\nmass = 1\ninertia = [0.1, 0.1, 0.1]\n[[joint]]\nkind = \"revolute\"\nnodes = [\"g\", \"d\"]\nat = \"g\"\naxis = [0, 0, 1]\n\
+         [[initial]]\nat = \"d\"\nspin = [0, 0, {spin}]\n{more}[output]\nnodes = [\"g\", \"d\"]\ncolumns = [\"reaction\", \"v\", \"w\"]\n{}",
+        stages(scheme, 0.01, &[0.1, 0.3])
+    )
+}
+
+#[test]
+fn supports_and_motions_that_begin_in_motion_move_all_that_joints_connect() {
+    let caught = "[[support]]\nat = \"d\"\nfix = \"uy\"\nstages = [2]\n";
+    let moved = "[history.h]\nexpr = \"-0.5*t\"\n[[motion]]\nat = \"d\"\nux = 1\nhistory = { name = \"h\", stages = [2] }\nstages = [2]\n";
+    for scheme in SCHEMES {
+        // The body stands still, and no force holds it.
+        let run = simulate(&hinged(scheme, 1.0, caught));
+        for (spin, force) in run.column("d.wz").iter().zip(run.column("g.fx")).skip(11) {
+            assert!(spin.abs() < 1e-9 && force.abs() < 1e-6, "{scheme}: {spin}, {force}");
+        }
+        // With vx = -0.5 it turns at -vx/y, y = 1 at first, and goes on so: y falls by 0.1 in 0.1, to first order.
+        let run = simulate(&hinged(scheme, 0.0, moved));
+        for (k, spin) in run.column("d.wz").iter().enumerate().skip(11) {
+            // x = 2 - 0.5 t and y = sqrt(5 - x^2).
+            let x: f64 = 2.0 - 0.5 * (0.01 * k as f64 - 0.1);
+            let exact = 0.5 / (5.0 - x * x).sqrt();
+            assert!((spin - exact).abs() < 2e-3, "{scheme}, row {k}: {spin} for {exact}");
+        }
+    }
+}

@@ -10,7 +10,7 @@ use crate::run::failure::Failure;
 use crate::run::spatial::SpatialLook;
 use crate::run::stage_run::StageRun;
 use crate::solve::{NewtonFailure, SoftMode, Tangent, mechanism};
-use crate::system::{DofMap, Slot, System};
+use crate::system::{DofMap, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
 use crate::warning::WarningKind;
@@ -181,7 +181,7 @@ impl Dynamics<'_, '_> {
         if self.stage.model.multipliers.is_empty() && caught.is_none() {
             return Ok(());
         }
-        let [rates, _] = self.stage.assembly.drift(self.stage.state);
+        let rates = self.rates_before(caught);
         self.stage.assembly.evaluate(self.stage.state, Weights::MASS, caught);
         self.refuse_open_joints()?;
         self.stage.assembly.system.forget_forces();
@@ -191,6 +191,20 @@ impl Dynamics<'_, '_> {
             *v += impulse;
         }
         Ok(())
+    }
+
+    /// The rates of gaps before velocities in held directions have changed by `caught`: the changes act
+    /// through the tangent.
+    fn rates_before(&self, caught: Option<&[Vec3]>) -> Vec<Vec3> {
+        let StageRun { assembly, state, .. } = &*self.stage;
+        let Some(caught) = caught else {
+            let [rates, _] = assembly.drift(state);
+            return rates;
+        };
+        let mut before = State::clone(state);
+        before.v.iter_mut().zip(caught).for_each(|(v, &change)| *v -= change);
+        let [rates, _] = assembly.drift(&before);
+        rates
     }
 
     /// A dynamic stage never jumps: neither do joints that a stage before has left open.
