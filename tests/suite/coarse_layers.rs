@@ -101,3 +101,22 @@ fn an_accuracy_is_that_of_resolved_bending() {
         assert!((moment / exact - 1.0).abs() < 1e-3, "{tension}: {moment} for {exact}");
     }
 }
+
+#[test]
+fn frequencies_that_bending_does_not_matter_for_are_not_told() {
+    // A pinned string of steel, 0.65 m, with a radius of 0.15 mm, under 70 N: its modes are sines.
+    let string = "[effects]\nplanar = false\n[point]\na = [0, 0, 0]\nb = [0.65, 0, 0]\n[material.steel]\nE = 2e11\nnu = 0.3\nrho = 7850\n[section.s]\nmaterial = \"steel\"\nshape = \"circle\"\nradius = 0.15e-3\n\
+         [[beam]]\nname = \"string\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 10\norder = 2\n\
+         [[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\"]\n[[support]]\nat = \"b\"\nfix = [\"uy\", \"uz\"]\n\
+         [[load]]\nat = \"b\"\nforce = [70, 0, 0]\n[[stage]]\nkind = \"static\"\nsteps = 2\n[[stage]]\nkind = \"modal\"\nmodes = 8\n";
+    assert!(!is_told(&simulate(string)));
+}
+
+#[test]
+fn a_stiff_beam_beside_a_wire_does_not_hide_it() {
+    let mast = "[[beam]]\nname = \"mast\"\nsection = \"stiff\"\nthrough = [\"a\", \"c\"]\nelements = 4\n[section.stiff]\nEA = 1e9\nGA = 1e9\nEI = 1e6\nGJ = 1e6\n[[load]]\nat = \"c\"\nforce = [1e4, 0, 0]\n";
+    let both = wire(2e4, 6, 2, CLAMP, ALONG_X)
+        .replace("[section.s]", "c = [0, 0, 3]\n[section.s]")
+        .replace("[output]", &format!("{mast}[output]"));
+    assert!(is_told(&simulate(&both)));
+}

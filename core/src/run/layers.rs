@@ -20,16 +20,31 @@ const UNRESOLVED: f64 = 10.0;
 const RESOLVING: f64 = 4.0;
 
 /// The change of the bending moment between neighbouring points, over the largest moment of the
-/// scene, from which on it is told.
+/// beam, from which on it is told.
 const TOLD_CHANGE: f64 = 0.25;
 
+/// The part of bending in the energy of a mode from which on its bending matters.
+const TOLD_ENERGY: f64 = 0.05;
+
 /// The largest bend, in radians over the length that an integration point stands for, that is none.
-const NO_BEND: f64 = 1e-9;
+const NO_BEND: f64 = 1e-6;
 
 impl Bending {
     /// The part of a moment that bends.
     fn across(&self, moment: Vec3) -> Vec3 {
         moment - self.tangent * moment.dot(self.tangent)
+    }
+
+    /// Twice the energy of its bending.
+    fn energy(&self) -> f64 {
+        let across = self.across(self.moment);
+        let Some(axis) = across.normalized() else { return 0.0 };
+        across.squared() / axis.dot(self.stiffness * axis) * self.length
+    }
+
+    /// True if another point follows it in its element or beam.
+    fn is_before(&self, next: &Self) -> bool {
+        self.element == next.element || self.ends[1] == next.ends[0]
     }
 
     /// The length over which its bending decays; `None` without tension or bending.
@@ -67,23 +82,30 @@ pub(super) struct Unresolved {
 pub(super) struct Look {
     /// The point before
     last: Option<Bending>,
-    /// The largest bending moment so far
+    /// The largest bending moment of the beam so far
     largest: f64,
-    /// True if something bends by more than round-off
+    /// True if the beam bends by more than round-off
     bends: bool,
-    /// The place with the largest change of the moment between points that are too far apart
+    /// The place of the beam with the largest change of the moment between points that are too far apart
     worst: Option<Unresolved>,
+    /// The worst place of all beams before
+    told: Option<Unresolved>,
+    /// Twice the energy of bending
+    energy: f64,
 }
 
 impl Look {
     /// Looks at the next point; points of an element follow each other, and so do elements of a beam.
     pub(super) fn take(&mut self, point: Bending) {
-        let moment = point.across(point.moment);
-        let size = moment.norm();
+        if self.last.is_some_and(|last| !last.is_before(&point)) {
+            self.end_beam();
+        }
+        let size = point.across(point.moment).norm();
+        self.energy += point.energy();
         self.largest = self.largest.max(size);
         self.bends |= size * point.length > NO_BEND * point.stiffness.max_abs();
         let last = self.last.replace(point);
-        let neighbour = last.filter(|last| last.element == point.element || last.ends[1] == point.ends[0]);
+        let neighbour = last.filter(|last| last.is_before(&point));
         let Some((last, decay)) = neighbour.and_then(|last| Some((last, longer(last.decay(), point.decay())?))) else {
             return;
         };
@@ -94,9 +116,18 @@ impl Look {
         }
     }
 
+    /// Ends a beam: nodes of the next one are others.
+    fn end_beam(&mut self) {
+        let Self { largest, bends, worst, .. } =
+            std::mem::replace(self, Self { told: self.told, energy: self.energy, ..Self::default() });
+        let told = worst.filter(|worst| bends && worst.change > TOLD_CHANGE * largest);
+        self.told = self.told.into_iter().chain(told).max_by(|a, b| a.change.total_cmp(&b.change));
+    }
+
     /// The place that is to be told.
-    pub(super) fn found(self) -> Option<Unresolved> {
-        self.worst.filter(|worst| self.bends && worst.change > TOLD_CHANGE * self.largest)
+    pub(super) fn found(mut self) -> Option<Unresolved> {
+        self.end_beam();
+        self.told
     }
 }
 
@@ -129,8 +160,9 @@ impl StageRun<'_> {
     }
 
     /// The place at which the bending that a field of increments adds to the present state is
-    /// resolved least.
-    pub(super) fn unresolved_along(&self, field: &[Vec3]) -> Option<Unresolved> {
+    /// resolved least. `None` also where bending is a small part of twice the energy of the field,
+    /// `energy`.
+    pub(super) fn unresolved_along(&self, field: &[Vec3], energy: f64) -> Option<Unresolved> {
         let about = self.assembly.origin().unwrap_or(self.state);
         // So that no unknown is larger than one: a rotation, or a displacement over the length of the scene.
         let size = |(&change, kind): (&Vec3, &SlotKind)| match kind {
@@ -152,7 +184,8 @@ impl StageRun<'_> {
                 look.take(Bending { moment: with.moment - point.moment, ..point });
             }
         });
-        look.found()
+        let matters = look.energy * largest * largest > TOLD_ENERGY * energy;
+        look.found().filter(|_| matters)
     }
 
     /// Warns of bending that decays over less than elements resolve, once in a run.

@@ -188,7 +188,10 @@ impl Modal<'_, '_> {
         if self.stage.issued.layers {
             return;
         }
-        let unresolved = |motion: &SmallMotion| self.stage.unresolved_along(&self.field(motion)?);
+        let unresolved = |motion: &SmallMotion| {
+            let energy = motion.shape.as_ref()?.mass * motion.exponent.norm_sqr();
+            self.stage.unresolved_along(&self.field(motion)?, energy)
+        };
         let found = listed.iter().enumerate().find_map(|(k, motion)| Some((k, unresolved(motion)?)));
         if let Some((k, place)) = found {
             let subject = format!("stage {}, mode {}", self.stage.number + 1, k + 1);
