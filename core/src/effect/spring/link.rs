@@ -64,8 +64,7 @@ impl Link {
             over_velocity: Mat3::zero(),
         };
         let length = d.norm();
-        let slack = self.tension_only && length.largest() <= self.length;
-        if slack {
+        if self.is_slack(length.largest()) {
             return zero;
         }
         if length.largest() == 0.0 {
@@ -88,9 +87,9 @@ impl Link {
         }
     }
 
-    /// True for a cable of the length of `d` without force.
-    fn is_slack(&self, d: Vec3) -> bool {
-        self.tension_only && d.norm() <= self.length
+    /// True for a cable without force at a distance of its nodes.
+    fn is_slack(&self, distance: f64) -> bool {
+        self.tension_only && distance <= self.length
     }
 
     /// The force at the second node, elastic and of damping.
@@ -117,7 +116,7 @@ impl Link {
 
     /// True for a cable that is neither slack nor taut all the time between two states.
     fn changes(&self, from: &State, to: &State, length: f64) -> bool {
-        let is_slack = |part: f64| self.is_slack(self.within([from, to], length, part)[0]);
+        let is_slack = |part: f64| self.is_slack(self.within([from, to], length, part)[0].norm());
         self.tension_only && [0.5, 1.0].into_iter().any(|part| is_slack(part) != is_slack(0.0))
     }
 
@@ -189,9 +188,13 @@ impl Effect for Links {
 
     fn energy(&self, at: &State) -> Energy {
         let one = |link: &Link| {
-            let stretch = link.between(at).0.norm() - link.length;
-            let slack = link.tension_only && stretch <= 0.0;
-            if slack { 0.0 } else { 0.5 * link.stiffness * stretch * stretch * at.amplitude[link.amplitude] }
+            let distance = link.between(at).0.norm();
+            let stretch = distance - link.length;
+            if link.is_slack(distance) {
+                0.0
+            } else {
+                0.5 * link.stiffness * stretch * stretch * at.amplitude[link.amplitude]
+            }
         };
         Energy { kinetic: 0.0, strain: self.links.iter().map(one).sum() }
     }
@@ -202,10 +205,9 @@ impl Effect for Links {
             let d = link.between(at).0;
             let change = b - a;
             let distance = d.norm();
-            let slack = link.tension_only && distance <= link.length;
             // Nodes at one place give no direction: any change stretches the link.
             let stretch = if distance == 0.0 { change.norm() } else { d.dot(change).abs() / distance };
-            if slack || link.stiffness == 0.0 { 0.0 } else { stretch / length }
+            if link.is_slack(distance) || link.stiffness == 0.0 { 0.0 } else { stretch / length }
         };
         self.acting(at).map(one).fold(0.0, f64::max)
     }

@@ -27,7 +27,7 @@ use crate::tensor::{Vec3, zeros};
 /// Third rates that keep the gaps of joints closed, by slot, with the least motion that mass allows.
 pub(super) struct JointJerk {
     /// q'''
-    whole: Vec<Vec3>,
+    rates3: Vec<Vec3>,
     /// q' - v0 over h^2
     lead: Vec<Vec3>,
 }
@@ -52,23 +52,27 @@ impl Dynamics<'_, '_> {
             return Ok(None);
         };
         let states = [&now, &half, &whole];
-        let [now, half, whole] = states.map(|state| self.stage.assembly.drift(state)[1].clone());
-        let rates3: Vec<Vec3> = (0..now.len()).map(|slot| slope([now[slot], half[slot], whole[slot]], step)).collect();
-        if rates3.iter().all(|&rate| rate == Vec3::ZERO) {
+        let rates2 = states.map(|state| {
+            let [_, rates2] = self.stage.assembly.drift(state);
+            rates2
+        });
+        let of_gap = |slot: usize| slope(rates2.each_ref().map(|rates2| rates2[slot]), step);
+        let of_gaps: Vec<Vec3> = (0..now.q.len()).map(of_gap).collect();
+        if of_gaps.iter().all(|&rate3| rate3 == Vec3::ZERO) {
             return Ok(None);
         }
         let factor = self.settings.scheme.error_factor().unwrap_or(0.0);
         let own = self.increments.as_ref().map(|increments| lead_of_turns(increments, states, step, factor));
-        let Some(whole) = self.closing_rates(&rates3)? else { return Ok(None) };
+        let Some(rates3) = self.closing_rates(&of_gaps)? else { return Ok(None) };
         let lead = match own {
-            None => whole.iter().map(|&rate3| rate3 * factor).collect(),
+            None => rates3.iter().map(|&rate3| rate3 * factor).collect(),
             Some(own) => {
                 let own = self.rates_of_gaps(&own);
-                let rest: Vec<Vec3> = rates3.iter().zip(own).map(|(&rate3, own)| rate3 * factor - own).collect();
+                let rest: Vec<Vec3> = of_gaps.iter().zip(own).map(|(&rate3, own)| rate3 * factor - own).collect();
                 self.closing_rates(&rest)?.unwrap_or_default()
             }
         };
-        Ok(Some(JointJerk { whole, lead }))
+        Ok(Some(JointJerk { rates3, lead }))
     }
 
     /// The length of the first step: fixed ones are shorter where rows or the end of the stage ask for
@@ -123,14 +127,14 @@ impl Dynamics<'_, '_> {
     pub(super) fn start_scheme(&mut self, jerk: Option<&JointJerk>) {
         let Step { scheme, length } = self.first_step();
         let state = &mut *self.stage.state;
-        let whole = jerk.map(|jerk| &jerk.whole[..]);
-        scheme.start(state, length, whole);
+        let rates3 = jerk.map(|jerk| &jerk.rates3[..]);
+        scheme.start(state, length, rates3);
         let Some(increments) = &self.increments else { return };
         let lag = scheme.lag();
-        let at_lag = whole.filter(|_| lag != 0.0).map(|whole| {
+        let at_lag = rates3.filter(|_| lag != 0.0).map(|rates3| {
             let mut at_lag = State::clone(state);
-            advance(&mut at_lag, lag * length, Some(whole));
-            (at_lag, whole)
+            advance(&mut at_lag, lag * length, Some(rates3));
+            (at_lag, rates3)
         });
         increments.start(state, at_lag.as_ref().map(|(state, jerk)| AtLag { state, lag, jerk }));
     }
