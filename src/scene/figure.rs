@@ -1,11 +1,11 @@
 //! The shape of a scene, for pictures.
 
-use super::mesh::{Mesh, MeshBeam};
+use super::beam_points::BeamPoints;
+use super::mesh::MeshBeam;
 use beamsim_core::effect::contact::SurfaceContacts;
-use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::Link;
-use beamsim_core::probe::{BeamPoint, Figure, Line, LinePoint, Place};
+use beamsim_core::probe::{Figure, Line, LinePoint, Place};
 use beamsim_core::section::recovery::PlacedRecovery;
 use beamsim_core::tensor::Mat3;
 use nalgebra::Matrix6;
@@ -17,10 +17,9 @@ pub type SectionsAtNodes = Vec<Vec<Option<PlacedRecovery>>>;
 /// Every node of every beam, the rigid bodies, and the ends of what joins two nodes. `sections` may be
 /// empty.
 pub fn figure(
-    mesh: &Mesh,
+    points: BeamPoints,
     bodies: &[Body],
     links: &[Link],
-    elasticity: &[Arc<dyn StressField>],
     sections: &SectionsAtNodes,
     contacts: Option<Arc<SurfaceContacts>>,
 ) -> Figure {
@@ -28,25 +27,20 @@ pub fn figure(
     let line = |(number, beam): (usize, &MeshBeam)| Line {
         name: beam.name.clone(),
         order: beam.order,
-        points: (0..beam.nodes.len()).map(|k| point(mesh, number, k, elasticity, section(number, k))).collect(),
+        points: (0..beam.nodes.len()).map(|k| point(&points, number, k, section(number, k))).collect(),
     };
     let bare = |node, place| Place { nodes: vec![(node, place, 1.0)], frame: Mat3::IDENTITY, relative: false };
     let ends = |link: &Link| [0, 1].map(|k| bare(link.nodes[k], link.places[k]));
     Figure {
-        lines: mesh.beams.iter().enumerate().map(line).collect(),
+        lines: points.mesh.beams.iter().enumerate().map(line).collect(),
         bodies: bodies.iter().map(|body| bare(body.node, body.place)).collect(),
         links: links.iter().map(ends).collect(),
         contacts,
     }
 }
 
-fn point(
-    mesh: &Mesh,
-    number: usize,
-    k: usize,
-    elasticity: &[Arc<dyn StressField>],
-    section: Option<PlacedRecovery>,
-) -> LinePoint {
+fn point(points: &BeamPoints, number: usize, k: usize, section: Option<PlacedRecovery>) -> LinePoint {
+    let mesh = points.mesh;
     let beam = &mesh.beams[number];
     let node = &mesh.nodes[beam.nodes[k]];
     let fraction = beam.fractions[k];
@@ -64,7 +58,7 @@ fn point(
     let compliance = Matrix6::from_fn(|i, j| stiffness[i][j]).try_inverse().unwrap_or_default();
     LinePoint {
         place: Place { nodes: vec![(node.node, node.place, 1.0)], frame, relative: false },
-        inside: BeamPoint { beam: number, fraction, elasticity: elasticity.to_vec(), sides, frame },
+        inside: points.point(number, fraction, sides),
         compliance: std::array::from_fn(|i| std::array::from_fn(|j| compliance[(i, j)])),
         section,
     }

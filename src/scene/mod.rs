@@ -1,6 +1,7 @@
 //! From a deck to a scene: the one place that sees words and numbers both.
 
 mod along;
+mod beam_points;
 mod check;
 mod compose;
 mod computed;
@@ -34,6 +35,7 @@ pub use stress::{coarse_stresses, recovery as section_stresses};
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, Severity, Spanned, StageBody, Target, Words, words,
 };
+use beam_points::{BeamPoints, PlainNodes};
 use beamsim_core::effect::contact::SurfaceContacts;
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::effect::inertia::Body;
@@ -82,6 +84,8 @@ pub struct Scene {
     pub(crate) resolved: serde_json::Value,
     /// Beam elasticity, the source of stress resultants
     elasticity: Vec<Arc<dyn StressField>>,
+    /// Nodes at which only elements act
+    plain: PlainNodes,
     /// Surfaces and contacts, for pictures
     contacts: Option<Arc<SurfaceContacts>>,
     /// The deck, if pictures show the stresses of its sections
@@ -94,7 +98,13 @@ impl Scene {
         let contacts = self.contacts.clone();
         // Sections at all nodes are prepared for pictures alone: most runs have none.
         let sections = self.stress_deck.as_ref().map(|deck| SectionStresses::new(deck).at_nodes(&self.mesh));
-        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity, &sections.unwrap_or_default(), contacts)
+        let points = BeamPoints {
+            mesh: &self.mesh,
+            elasticity: &self.elasticity,
+            effects: &self.plan.model.effects,
+            plain: &self.plain,
+        };
+        figure::figure(points, &self.bodies, &self.links, &sections.unwrap_or_default(), contacts)
     }
 
     /// All texts of the deck that may name a place on a beam.
@@ -119,7 +129,8 @@ impl Scene {
     /// components.
     pub fn stresses(&self, element: usize, at: &Snapshot) -> Vec<[[f64; 3]; 4]> {
         let fields = &mut self.elasticity.iter();
-        let values = fields.find_map(|field| field.at_points(element as u32, at.state, at.origin)).unwrap_or_default();
+        let found = fields.find_map(|field| field.stresses(element as u32, at.state, at.origin));
+        let values = found.map(|stresses| stresses.at_points()).unwrap_or_default();
         values.iter().map(|(strain, stress)| [strain.gamma.0, strain.kappa.0, stress.n.0, stress.m.0]).collect()
     }
 }
@@ -306,7 +317,12 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         motions.push(slid.motion);
     }
     let stresses = SectionStresses::new(deck);
-    let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity, stresses: &stresses };
+    let supported = supports.iter().flat_map(|support| &support.directions).map(|direction| direction.slot);
+    let moved = motions.iter().map(|motion| motion.slot);
+    let plain = PlainNodes::new(supported.chain(moved).chain(composition.acting_at_nodes()).collect());
+    let points =
+        BeamPoints { mesh: &mesh, elasticity: &composition.elasticity, effects: &composition.effects, plain: &plain };
+    let columns = Columns { deck, mesh: &mesh, points, stresses: &stresses };
     let probes = columns.written(&mut found);
     let envelope = deck.output.envelope.as_ref().map(|span| columns.stress_places(span, &mut found));
     let profile = deck.output.profile.as_ref().map(|span| columns.profile_places(span));
@@ -370,6 +386,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         links: composition.links,
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
+        plain,
         contacts: composition.contacts,
         stress_deck,
     })

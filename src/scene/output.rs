@@ -1,18 +1,17 @@
 //! The columns that a deck writes or watches, found by name and bound to nodes, beams and the
 //! scene.
 
+use super::beam_points::BeamPoints;
 use super::mesh::Mesh;
 use super::names::{Found, unknown};
 use super::stress::SectionStresses;
 use crate::deck::{Contact, Deck, Diagnostic, ExpectBody, Span, Spanned, hint, nearest, one_of};
-use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::probe::{
     BeamPoint, COLUMNS, ColumnGroup, ENERGY_WITH_CONTACTS, Need, Place, Probe, ProfilePlace, Reading, STRESS_AT_POINT,
     STRESS_WITH_INDEX, Source, StressPlace, StressPoint, clocks, find_column, group,
 };
 use beamsim_core::sorting::sort_numbers;
 use beamsim_core::system::Node;
-use std::sync::Arc;
 
 /// Groups that are written where a deck asks for none.
 const DEFAULT_GROUPS: [&str; 2] = ["u", "r"];
@@ -26,8 +25,8 @@ pub struct Columns<'a> {
     pub(super) deck: &'a Deck,
     /// The mesh
     pub(super) mesh: &'a Mesh,
-    /// Elasticity of the scene, for strains and resultants
-    pub(super) elasticity: &'a [Arc<dyn StressField>],
+    /// Points of beams, for strains and resultants
+    pub(super) points: BeamPoints<'a>,
     /// Stresses of sections
     pub(super) stresses: &'a SectionStresses<'a>,
 }
@@ -276,7 +275,7 @@ impl Columns<'_> {
         if xi > 1.0 - 1e-9 && element + 1 < beam.elements.end {
             sides.push((element as u32 + 1, -1.0));
         }
-        BeamPoint { beam: number, fraction, elasticity: self.elasticity.to_vec(), sides, frame: beam.frame(fraction) }
+        self.points.point(number, fraction, sides)
     }
 
     /// Probe and component of a column, by its name.

@@ -43,6 +43,7 @@ mod relative;
 mod report;
 mod rest;
 mod restart;
+mod resultants;
 mod resume;
 mod rotations;
 mod scenes;

@@ -27,6 +27,15 @@ pub struct Stress<T = f64> {
     pub m: Vec3<T>,
 }
 
+impl<T: Real> Stress<T> {
+    /// The components of N, then of M.
+    #[inline(always)]
+    pub fn components(&self) -> [T; 6] {
+        let Self { n, m } = self;
+        [n.0[0], n.0[1], n.0[2], m.0[0], m.0[1], m.0[2]]
+    }
+}
+
 /// The tangent of a law in global components: dN = Cn dGamma + Cc dK, dM = Cc^T dGamma + Cm dK.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stiffness<T = f64> {

@@ -2,23 +2,30 @@
 
 /// The values of the shape functions of an element of N nodes at `xi`.
 pub fn values<const N: usize>(xi: f64) -> [f64; N] {
-    std::array::from_fn(|i| {
-        let others = (0..N).filter(|&k| k != i);
-        others.map(|k| (xi - node_coordinate(k, N)) / (node_coordinate(i, N) - node_coordinate(k, N))).product()
-    })
+    let nodes: [f64; N] = std::array::from_fn(|i| node_coordinate(i, N));
+    std::array::from_fn(|i| lagrange(&nodes, i, xi))
 }
 
 /// The derivatives over xi of the shape functions of an element of N nodes at `xi`.
 pub fn derivatives<const N: usize>(xi: f64) -> [f64; N] {
-    std::array::from_fn(|i| {
-        let term = |left_out: usize| -> f64 {
-            let slope = 1.0 / (node_coordinate(i, N) - node_coordinate(left_out, N));
-            let others = (0..N).filter(|&k| k != i && k != left_out);
-            others
-                .fold(slope, |p, k| p * (xi - node_coordinate(k, N)) / (node_coordinate(i, N) - node_coordinate(k, N)))
-        };
-        (0..N).filter(|&k| k != i).map(term).sum()
-    })
+    let nodes: [f64; N] = std::array::from_fn(|i| node_coordinate(i, N));
+    std::array::from_fn(|i| lagrange_slope(&nodes, i, xi))
+}
+
+/// The value at `x` of the polynomial that is one at abscissa `i` and zero at the others.
+pub fn lagrange(abscissas: &[f64], i: usize, x: f64) -> f64 {
+    let others = (0..abscissas.len()).filter(|&k| k != i);
+    others.map(|k| (x - abscissas[k]) / (abscissas[i] - abscissas[k])).product()
+}
+
+/// The derivative at `x` of the polynomial that is one at abscissa `i` and zero at the others.
+fn lagrange_slope(abscissas: &[f64], i: usize, x: f64) -> f64 {
+    let term = |left_out: usize| -> f64 {
+        let slope = 1.0 / (abscissas[i] - abscissas[left_out]);
+        let others = (0..abscissas.len()).filter(|&k| k != i && k != left_out);
+        others.fold(slope, |p, k| p * (x - abscissas[k]) / (abscissas[i] - abscissas[k]))
+    };
+    (0..abscissas.len()).filter(|&k| k != i).map(term).sum()
 }
 
 /// The coordinate on [-1, 1] of node `i` of `n`.

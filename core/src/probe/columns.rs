@@ -4,7 +4,8 @@
 //! A new group of columns is a row of [`COLUMNS`] and the function that reads it. Histories,
 //! expectations, error scales, pictures and the report ask the row.
 
-use super::place::{BeamPoint, Place, StressPlace, StressPoint};
+use super::beam_point::{BeamPoint, SeenElements, StressPlace, StressPoint};
+use super::place::Place;
 use super::quantity::Quantity;
 use crate::kernel::inertia::Spin;
 use crate::rotation::{Rotation, Series, principal};
@@ -168,7 +169,9 @@ pub static COLUMNS: [ColumnGroup; 21] = [
             part("section force", Quantity::SectionForce, &["N1", "N2", "N3"]),
             part("section moment", Quantity::SectionMoment, &["M1", "M2", "M3"]),
         ],
-        source: Source::BeamPoint(|point, at, out| out.extend(point.strain_and_stress(at.state, at.origin)[1])),
+        source: Source::BeamPoint(|point, at, out| {
+            out.extend(point.strain_and_stress(&mut SeenElements::new(at.state, at.origin))[1])
+        }),
         needs: &[],
         nearest: None,
     },
@@ -178,7 +181,9 @@ pub static COLUMNS: [ColumnGroup; 21] = [
             part("strain", Quantity::Strain, &["G1", "G2", "G3"]),
             part("change of curvature", Quantity::Curvature, &["K1", "K2", "K3"]),
         ],
-        source: Source::BeamPoint(|point, at, out| out.extend(point.strain_and_stress(at.state, at.origin)[0])),
+        source: Source::BeamPoint(|point, at, out| {
+            out.extend(point.strain_and_stress(&mut SeenElements::new(at.state, at.origin))[0])
+        }),
         needs: &[],
         nearest: None,
     },

@@ -1,7 +1,7 @@
 //! The largest stresses over the time of a run, at places along beams.
 
+use super::beam_point::{SeenElements, StressPlace};
 use super::largest_row::{Extreme, LargestRow, Row};
-use super::place::{LastElement, StressPlace};
 use crate::run::Snapshot;
 use crate::section::recovery::{Criterion, PlacedRecovery};
 use serde::{Deserialize, Serialize};
@@ -74,9 +74,9 @@ impl Envelope {
     /// Takes a converged state.
     pub fn row(&mut self, at: &Snapshot) {
         let moment = at.moment();
-        let mut last = LastElement::default();
+        let mut seen = SeenElements::new(at.state, at.origin);
         for (place, Followed { von_mises, index }) in self.places.iter().zip(&mut self.followed) {
-            let resultant = place.inside.strain_and_stress_after(&mut last, at.state, at.origin)[1];
+            let resultant = place.inside.strain_and_stress(&mut seen)[1];
             von_mises.row(&place.section, Criterion::VonMises, Row { moment, resultant });
             if has_own_index(&place.section) {
                 index.row(&place.section, Criterion::FailureIndex, Row { moment, resultant });

@@ -1,7 +1,8 @@
 //! Columns bound to the node, beam point or scene that they are read from.
 
+use super::beam_point::{BeamPoint, StressPlace, StressPoint};
 use super::columns::ColumnGroup;
-use super::place::{BeamPoint, Place, StressPlace, StressPoint};
+use super::place::Place;
 use crate::run::Snapshot;
 use crate::system::Node;
 

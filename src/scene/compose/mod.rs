@@ -26,7 +26,7 @@ use beamsim_core::model::beam_element::{SectionPoint, push_elastic};
 use beamsim_core::model::{Amplitude, History, SlotKind, StageSet, Support};
 use beamsim_core::probe::Need;
 use beamsim_core::run::Driven;
-use beamsim_core::system::Slot;
+use beamsim_core::system::{Node, Slot};
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -73,6 +73,8 @@ pub struct Composition {
     pub(super) links: Vec<Link>,
     /// Springs to ground
     pub(super) springs: Vec<GroundSpring>,
+    /// Nodes with a [[load]] `at` them
+    pub(super) loaded: Vec<Node>,
     /// Slots of multipliers, behind those of the mesh: what they hold, and the joint
     pub(super) multipliers: Vec<(SlotKind, String)>,
     /// Components of these that nothing uses
@@ -88,6 +90,14 @@ pub struct Composition {
 }
 
 impl Composition {
+    /// Slots of displacements at which loads, bodies and springs act.
+    pub fn acting_at_nodes(&self) -> impl Iterator<Item = Slot> {
+        let bodies = self.bodies.iter().map(|body| body.node);
+        let springs = self.springs.iter().map(|spring| spring.node);
+        let links = self.links.iter().flat_map(|link| link.nodes);
+        self.loaded.iter().copied().chain(bodies).chain(springs).chain(links).map(|node| node.u)
+    }
+
     /// Lengths of bodies: radii of gyration and of contact.
     pub fn sizes(&self) -> Vec<f64> {
         let chains = self.contacts.iter().flat_map(|contacts| &contacts.chains);
@@ -136,6 +146,7 @@ pub fn compose(
         bodies: Vec::new(),
         links: Vec::new(),
         springs: Vec::new(),
+        loaded: Vec::new(),
         multipliers: Vec::new(),
         idle_multipliers: Vec::new(),
         slider_motions: Vec::new(),

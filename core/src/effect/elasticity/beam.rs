@@ -1,6 +1,7 @@
 //! Elasticity of beams (Makinen 2007, sections 3.2–3.4), for each interpolation of rotations.
 
 use super::element::{ElasticElement, ElasticPoint};
+use super::element_stresses::ElementStresses;
 use super::interpolation::{
     ElementConfiguration, HalfWayPoint, Interpolation, PointSum, Scratch, View, Workspace, is_half_way,
 };
@@ -117,22 +118,25 @@ impl<I: Interpolation> SpatialBeams for BeamElasticity<I> {
 
 /// Strains and stresses in beam elements of any interpolation.
 pub trait StressField: Send + Sync {
-    /// Strain and stress (material, global components) at the integration points of an element of
-    /// the scene; `None` if it belongs to another effect. `origin` is the state about which the
-    /// stage is linear; `None` in other stages.
-    fn at_points(&self, element: u32, at: &State, origin: Option<&State>) -> Option<Vec<(Strain, Stress)>>;
+    /// Strains and stresses of an element of the scene; `None` if it belongs to another effect.
+    /// `origin` is the state about which the stage is linear; `None` in other stages.
+    fn stresses(&self, element: u32, at: &State, origin: Option<&State>) -> Option<ElementStresses>;
 }
 
 impl<I: Interpolation> StressField for BeamElasticity<I> {
-    fn at_points(&self, element: u32, at: &State, origin: Option<&State>) -> Option<Vec<(Strain, Stress)>> {
+    fn stresses(&self, element: u32, at: &State, origin: Option<&State>) -> Option<ElementStresses> {
         for_each_batch!(self.elements, |_first, batch| {
-            // Batches are in the order of the scene.
-            if let Ok(k) = batch.binary_search_by_key(&element, |e| e.connection.element) {
-                return Some(batch[k].strains_and_stresses::<I>(at, origin).to_vec());
+            if let Some(k) = find(batch, element) {
+                return Some(batch[k].stresses::<I>(at, origin));
             }
         });
         None
     }
+}
+
+/// The place of an element of the scene in a batch, which is in the order of the scene.
+pub(super) fn find<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], element: u32) -> Option<usize> {
+    batch.binary_search_by_key(&element, |e| e.connection.element).ok()
 }
 
 impl<I: Interpolation> Effect for BeamElasticity<I> {
@@ -399,12 +403,6 @@ fn unpack<T: Real>(s: &[T; 6]) -> Stress<T> {
     Stress { n: Vec3([s[0], s[1], s[2]]), m: Vec3([s[3], s[4], s[5]]) }
 }
 
-#[inline(always)]
-pub(super) fn packed<T: Real>(stress: &Stress<T>) -> [T; 6] {
-    let Stress { n, m } = stress;
-    [n.0[0], n.0[1], n.0[2], m.0[0], m.0[1], m.0[2]]
-}
-
 /// Writes the stresses at the points of a batch, extrapolated over the correction `dq`.
 fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
@@ -439,7 +437,7 @@ fn extrapolate_side_by_side<I: Interpolation, const N: usize, const G: usize>(
         let dp: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| elements[k].connection.nodes[i].p)));
         let stresses = view.extrapolated(&sum.points, sum.free, &du, &dp);
         for g in 0..G {
-            let stress = packed(&stresses[g]);
+            let stress = stresses[g].components();
             for k in 0..LANES.min(batch.len() - start) {
                 out[(start + k) * G + g] = stress.map(|lanes| lanes.0[k]);
             }
@@ -616,6 +614,6 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         let free = self.free_amplitude(at);
         let (du, dp) = self.connection.variations_in_one_chart(at, |slot| dq[slot as usize]);
         let stresses = view.extrapolated(&self.points(), free, &du, &dp);
-        out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = packed(stress));
+        out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = stress.components());
     }
 }

@@ -61,7 +61,11 @@ fn build<I: Interpolation>(
 ) -> BuiltBeams {
     let stressed = BeamElasticity::<I>::new(elements);
     let elasticity = Arc::new(if geometric_stiffness { stressed } else { stressed.without_geometric_stiffness() });
-    let damper =
-        |viscosity| Arc::new(StrainRateDamping { elasticity: elasticity.clone(), viscosity }) as Arc<dyn Effect>;
-    BuiltBeams { elasticity: elasticity.clone(), stresses: elasticity.clone(), damping: damping.map(damper) }
+    match damping {
+        None => BuiltBeams { elasticity: elasticity.clone(), stresses: elasticity, damping: None },
+        Some(viscosity) => {
+            let damping = Arc::new(StrainRateDamping { elasticity: elasticity.clone(), viscosity });
+            BuiltBeams { elasticity, stresses: damping.clone(), damping: Some(damping) }
+        }
+    }
 }

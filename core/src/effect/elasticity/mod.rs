@@ -3,6 +3,7 @@
 mod beam;
 mod built;
 mod element;
+mod element_stresses;
 mod interpolation;
 mod planar;
 mod strain_rate_damping;
@@ -10,5 +11,6 @@ mod strain_rate_damping;
 pub use beam::{BeamElasticity, ElasticElements, StressField};
 pub use built::{BuiltBeams, RotationInterpolation};
 pub use element::{BeamLaw, ElasticElement, ElasticPoint};
+pub use element_stresses::ElementStresses;
 pub use interpolation::{Interpolation, RelativeVectors, TotalVectors};
 pub use strain_rate_damping::{StrainRateDamping, Viscosity};

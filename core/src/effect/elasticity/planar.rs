@@ -174,7 +174,7 @@ fn extrapolate_blocks<const N: usize, const G: usize>(
         in_one_turn(&mut nodes);
         for g in 0..G {
             let stress = block.points[g].extrapolated_stress(&nodes, free(elements, at), &change);
-            let packed = super::beam::packed(&in_space(stress, plane.axes()));
+            let packed = in_space(stress, plane.axes()).components();
             for k in 0..elements.len() {
                 out[(start + k) * G + g] = packed.map(|lanes| lanes.0[k]);
             }

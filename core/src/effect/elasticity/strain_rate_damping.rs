@@ -13,8 +13,9 @@
 //! any interpolation. b_k is its force under a unit stress, and G_k qd the rate of that force: a
 //! jet along the motion gives both.
 
-use super::beam::BeamElasticity;
+use super::beam::{BeamElasticity, StressField, find};
 use super::element::{ElasticElement, ElasticPoint, ElementNodes};
+use super::element_stresses::ElementStresses;
 use super::interpolation::{ElementConfiguration, Interpolation, PointSum, View, Workspace};
 use crate::effect::{Effect, Roles, TangentForm, after_displacement, for_each_batch};
 use crate::kernel::elastic::Point;
@@ -52,6 +53,12 @@ impl Viscosity {
             Self::Proportional(_) => None,
             Self::Points(all) => all[G - 1][G * number..].first_chunk(),
         }
+    }
+
+    /// The damping of an element of the instance `number`; `starts` are the first instances of each
+    /// order.
+    fn of_element<const G: usize>(&self, number: usize, starts: &[usize; 3]) -> PointDamping<'_, G> {
+        PointDamping { factor: self.factor(), own: self.points::<G>(number - starts[G - 1]) }
     }
 
     /// The factor of the stiffness of a point, in units of time.
@@ -99,9 +106,7 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
-        let elements = &self.elasticity.elements;
-        // The number of the first element with as many nodes, by points of an element.
-        let starts = [0, elements.two.len(), elements.two.len() + elements.three.len()];
+        let starts = self.starts();
         for_each_batch!(self.elasticity.elements, out.instances(), |first, batch| {
             add_batch::<I, _, _>(batch, first, (&self.viscosity, &starts), at, weights, out);
         });
@@ -113,6 +118,52 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
 
     fn roles(&self) -> Roles<'_> {
         Roles::NONE
+    }
+}
+
+impl<I: Interpolation> StressField for StrainRateDamping<I> {
+    fn stresses(&self, element: u32, at: &State, origin: Option<&State>) -> Option<ElementStresses> {
+        let starts = self.starts();
+        for_each_batch!(self.elasticity.elements, |first, batch| {
+            if let Some(k) = find(batch, element) {
+                let mut stresses = batch[k].stresses::<I>(at, origin);
+                // Damping in proportion to the stiffness leaves elastic stresses in balance.
+                if let Viscosity::Points(_) = self.viscosity {
+                    let damping = self.viscosity.of_element(first + k, &starts);
+                    stresses
+                        .add_damping(&damping_stresses::<I, _, _>(&batch[k], damping, at, origin), origin.is_some());
+                }
+                return Some(stresses);
+            }
+        });
+        None
+    }
+}
+
+/// The damping stress at each point of an element. `origin` is the state about which the stage is
+/// linear; `None` in other stages.
+fn damping_stresses<I: Interpolation, const N: usize, const G: usize>(
+    element: &ElasticElement<N, G>,
+    damping: PointDamping<G>,
+    at: &State,
+    origin: Option<&State>,
+) -> [Stress; G] {
+    let member = element.member();
+    let moving = member.connection.motions_in_one_chart(at);
+    let mut nodes = member.connection.motions_in_one_chart(origin.unwrap_or(at));
+    for (node, motion) in nodes.iter_mut().zip(&moving) {
+        node.u_rate = motion.u_rate;
+        node.p_rate = motion.p_rate;
+    }
+    let motion = ElementMotion::new(member, &nodes, at);
+    motion.stresses(&I::alone(&motion.configuration), &element.points(), damping)
+}
+
+impl<I> StrainRateDamping<I> {
+    /// The number of the first element with as many nodes, by points of an element.
+    fn starts(&self) -> [usize; 3] {
+        let elements = &self.elasticity.elements;
+        [0, elements.two.len(), elements.two.len() + elements.three.len()]
     }
 }
 
@@ -130,8 +181,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
         let member = element.member();
         member.connection.evaluate(at, weights, true, &after_displacement, &mut system, &|nodes, weights, out| {
             let motion = ElementMotion::new(member, nodes, at);
-            let damping =
-                PointDamping { factor: viscosity.factor(), own: viscosity.points::<G>(first + k - starts[G - 1]) };
+            let damping = viscosity.of_element(first + k, starts);
             motion.add::<I, G>(&element.points(), damping, weights, &mut scratch_memory.borrow_mut(), out);
         });
         out.add(first + k, &system);

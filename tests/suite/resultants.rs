@@ -1,0 +1,187 @@
+//! Strains and stress resultants along beams: in balance with reactions, and of higher order than the strains that
+//! elements have at their points.
+
+use crate::random::Random;
+use crate::scenes::{Simulation, list, simulate};
+
+const SECTION: &str =
+    "[section.s]\nEA = 1e5\nGA = [2e4, 3e4]\nGJ = 8\nEI = [10, 20]\nrhoA = 1\nrhoJ = [2e-3, 1e-3, 1e-3]\n";
+
+const STATIC: &str = "[[stage]]\nkind = \"static\"\nsteps = 4\n";
+
+const PLACES: [&str; 5] = ["a", "arm@0.25", "arm@0.3", "arm@0.5", "b"];
+
+/// A beam that is clamped at its start, with elements of an order.
+struct Cantilever<'a> {
+    /// Its centre line
+    line: String,
+    interpolation: &'a str,
+    /// Tables of loads and others
+    rest: String,
+}
+
+impl Cantilever<'_> {
+    /// A run with columns at places.
+    fn run(&self, order: usize, elements: usize, places: &[&str], columns: &str, stages: &str) -> Simulation {
+        let Self { line, interpolation, rest } = self;
+        simulate(&format!(
+            "[effects]\nplanar = false\n{SECTION}[[beam]]\nname = \"arm\"\nsection = \"s\"\n{line}elements = {elements}\n\
+             order = {order}\ninterpolation = \"{interpolation}\"\n[[support]]\nat = \"a\"\nfix = \"all\"\n{rest}\
+             [output]\nnodes = {places:?}\ncolumns = {columns}\n{stages}"
+        ))
+    }
+
+    /// Forces and moments (local axes) at all places at the end of a run.
+    fn resultants(&self, order: usize, elements: usize, stages: &str) -> Vec<[f64; 6]> {
+        let run = self.run(order, elements, &PLACES, "[\"resultant\"]", stages);
+        PLACES.iter().map(|place| resultant(&run, place)).collect()
+    }
+}
+
+fn resultant(run: &Simulation, place: &str) -> [f64; 6] {
+    ["N1", "N2", "N3", "M1", "M2", "M3"].map(|name| run.end(&format!("{place}.{name}")))
+}
+
+/// A straight beam along x with `loads`.
+fn straight(loads: &str, interpolation: &'static str) -> Cantilever<'static> {
+    let line = "through = [\"a\", \"b\"]\n".to_string();
+    let points = "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n";
+    Cantilever { line, interpolation, rest: format!("{points}{loads}") }
+}
+
+/// The largest difference of forces, and of moments, at all places.
+fn differences(a: &[[f64; 6]], b: &[[f64; 6]]) -> [f64; 2] {
+    let largest = |part: std::ops::Range<usize>| {
+        let all = a.iter().zip(b).flat_map(|(a, b)| part.clone().map(|k| (a[k] - b[k]).abs()));
+        all.fold(0.0, f64::max)
+    };
+    [largest(0..3), largest(3..6)]
+}
+
+/// The order by which an error falls where elements are halved.
+fn order_of(errors: [f64; 2]) -> f64 {
+    (errors[0] / errors[1]).log2()
+}
+
+/// Under loads at nodes forces and moments at a clamp are those of the reaction, on any mesh.
+#[test]
+fn resultants_at_clamps_are_reactions() {
+    let mut random = Random::new(7);
+    for trial in 0..12 {
+        let order = 1 + trial % 3;
+        let [axis, side] = random.axes();
+        let [a, b] = [random.vector(1.0), axis];
+        let middle = a + axis * 0.5 + side * 0.2;
+        let lines = [
+            format!("through = [\"a\", \"b\"]\ntwist = [0, {}]\n", random.range(-1.0, 1.0)),
+            format!("arc = [\"a\", {}, \"b\"]\n", list(middle)),
+        ];
+        let [force, moment] = [list(random.cube(6.0)), list(random.cube(2.0))];
+        let points = format!("[point]\na = {}\nb = {}\n", list(a), list(a + b));
+        let loads = format!("[[load]]\nat = \"b\"\nforce = {force}\nmoment = {moment}\n");
+        let beam = Cantilever {
+            line: lines[trial / 3 % 2].clone(),
+            interpolation: ["relative", "total"][trial % 2],
+            rest: format!("{points}{loads}"),
+        };
+        let run = beam.run(order, 6, &["a"], "[\"reaction\", \"resultant\"]", STATIC);
+        let found = resultant(&run, "a");
+        let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let [f, m] = ["a.f", "a.m"].map(|name| norm(&run.vector(name)));
+        let allowed = [2e-3, 1e-4, 1e-5][order - 1];
+        assert!((norm(&found[..3]) / f - 1.0).abs() < allowed, "order {order}: {found:?}, {f}");
+        assert!((norm(&found[3..]) / m - 1.0).abs() < allowed, "order {order}: {found:?}, {m}");
+    }
+}
+
+/// Strains of elements have the order of the elements away from their points; moments gain an order, and with two nodes
+/// forces gain one, also where forces act along the beam.
+#[test]
+fn resultants_gain_an_order() {
+    let loads = "[[load]]\nat = \"b\"\nforce = [0, 8, 2]\nmoment = [0.3, 0, 0]\n\
+                 [[load]]\nalong = \"arm\"\nforce = [-5, 9, 4]\n";
+    for interpolation in ["relative", "total"] {
+        let beam = straight(loads, interpolation);
+        let exact = beam.resultants(3, 80, STATIC);
+        for (order, wanted) in [(1, [1.8, 1.8]), (2, [1.8, 2.8]), (3, [2.4, 3.7])] {
+            let errors = [8, 16].map(|elements| differences(&beam.resultants(order, elements, STATIC), &exact));
+            for (kind, name) in [(0, "forces"), (1, "moments")] {
+                let observed = order_of([errors[0][kind], errors[1][kind]]);
+                assert!(observed > wanted[kind], "{interpolation}, order {order}, {name}: {observed}, {errors:?}");
+            }
+        }
+        let [force, moment] = differences(&beam.resultants(1, 16, STATIC), &exact);
+        assert!(force < 0.05 && moment < 5e-3, "{interpolation}: {force}, {moment}");
+    }
+}
+
+/// Forces at nodes are not taken for forces along the beam, also where each node has one.
+#[test]
+fn forces_at_nodes_stay_at_nodes() {
+    let all = |nodes: usize| -> String {
+        let load = |k: usize| format!("[[load]]\nat = \"arm@{}\"\nforce = [0.05, 0.01, 0]\n", k as f64 / nodes as f64);
+        (1..=nodes).map(load).collect()
+    };
+    let beam = straight(&all(8), "relative");
+    let run = beam.run(1, 8, &["a", "arm@0.45", "b"], "[\"resultant\"]", STATIC);
+    for (column, expected) in
+        [("a.N1", 0.4), ("a.N2", 0.08), ("arm@0.45.N1", 0.25), ("arm@0.45.M3", 0.015), ("b.N1", 0.05)]
+    {
+        assert!((run.end(column) / expected - 1.0).abs() < 0.02, "{column}: {} instead of {expected}", run.end(column));
+    }
+    let one = "[[load]]\nat = \"arm@0.25\"\nforce = [0, 1, 0]\n[[load]]\nat = \"b\"\nforce = [0, 1e-3, 0]\n";
+    for elements in [4, 8] {
+        let run = straight(one, "relative").run(1, elements, &["a", "b"], "[\"resultant\"]", STATIC);
+        let [root, tip] = ["a.N2", "b.N2"].map(|name| run.end(name));
+        assert!((root - 1.001).abs() < 1e-3 && (tip - 1e-3).abs() < 1e-5, "{elements}: {root}, {tip}");
+    }
+}
+
+/// The force at the top of what hangs: a single element shows its mean.
+#[test]
+fn forces_along_a_beam_reach_its_ends() {
+    let hanging = straight("[[load]]\nalong = \"arm\"\nforce = [1, 0, 0]\n", "relative");
+    let top = |elements| hanging.run(1, elements, &["a"], "[\"resultant\"]", STATIC).end("a.N1");
+    for (elements, expected) in [(1, 0.5), (2, 1.0), (3, 1.0), (9, 1.0)] {
+        assert!((top(elements) - expected).abs() < 1e-4, "{elements}: {}", top(elements));
+    }
+}
+
+/// Strains are those of the resultants, with the free strain.
+#[test]
+fn strains_belong_to_resultants() {
+    let loads = "[[load]]\nat = \"b\"\nforce = [0, 8, 2]\n[[load]]\nalong = \"arm\"\nforce = [-5, 9, 4]\n";
+    for order in 1..=3 {
+        let mut beam = straight(loads, "relative");
+        beam.line += "free_strain = [0, 0, 0, 0.1, 0.2, -0.3]\n";
+        let run = beam.run(order, 6, &PLACES, "[\"resultant\", \"strain\"]", STATIC);
+        let stiffness = [1e5, 2e4, 3e4, 8.0, 10.0, 20.0];
+        let free = [0.0, 0.0, 0.0, 0.1, 0.2, -0.3];
+        for place in PLACES {
+            let stress = resultant(&run, place);
+            let strain = ["G1", "G2", "G3", "K1", "K2", "K3"].map(|name| run.end(&format!("{place}.{name}")));
+            for k in 0..6 {
+                let off = stiffness[k] * (strain[k] - free[k]) - stress[k];
+                assert!(off.abs() < 1e-8, "order {order}, {place}: {stress:?}, {strain:?}");
+            }
+        }
+    }
+}
+
+/// Damping of curvatures alone: the elastic moment creeps towards that of the load, and its slope with it, while the
+/// force is that of the load at once.
+#[test]
+fn elastic_moments_leave_damping_out() {
+    let beam = straight(
+        "[damping]\nstiffness = [0, 0, 0, 0.5, 0.5, 0.5]\n[[load]]\nat = \"b\"\nforce = [0, 0.1, 0]\n",
+        "relative",
+    );
+    let stage = "[[stage]]\nkind = \"dynamic\"\nend = 0.5\nstep = 0.005\nscheme = \"generalized_alpha\"\nrho_inf = 0\n";
+    for order in 2..=3 {
+        let run = beam.run(order, 4, &["a", "arm@0.5"], "[\"resultant\"]", stage);
+        let crept = 0.1 * (1.0 - (-1.0_f64).exp());
+        let [root, middle] = ["a.M3", "arm@0.5.M3"].map(|name| run.end(name));
+        assert!((root / crept - 1.0).abs() < 0.02, "order {order}: {root}, {crept}");
+        assert!((middle / crept - 0.5).abs() < 0.02, "order {order}: {middle}, {crept}");
+    }
+}
