@@ -37,37 +37,40 @@ impl PlainNodes {
         Self { acting, found: OnceLock::new() }
     }
 
-    /// For each beam with elements of two nodes, each node between two of them.
+    /// For each beam each node between two elements, where elements have two nodes.
     fn of_beams(&self, mesh: &Mesh, effects: &[Arc<dyn Effect>]) -> &[Arc<[bool]>] {
         self.found.get_or_init(|| {
-            let displacement =
-                |beam: &MeshBeam| -> Vec<Slot> { beam.nodes.iter().map(|&node| mesh.nodes[node].node.u).collect() };
-            let beams: Vec<Vec<Slot>> = mesh.beams.iter().map(displacement).collect();
-            let elements: HashSet<[Slot; 2]> = beams.iter().flat_map(|beam| beam.array_windows().copied()).collect();
-            let node_at: HashMap<Slot, Slot> =
-                mesh.nodes.iter().flat_map(|at| [(at.node.u, at.node.u), (at.node.p, at.node.u)]).collect();
-            let mut not_plain: HashSet<Slot> = self.acting.iter().copied().collect();
+            let slots = |beam: &MeshBeam| beam.nodes.iter().map(|&node| mesh.nodes[node].node.u).collect();
+            let beams: Vec<Vec<Slot>> = mesh.beams.iter().map(slots).collect();
+            let elements: Vec<[Slot; 2]> =
+                beams.iter().flat_map(|beam| beam.windows(2).map(|w| [w[0], w[1]])).collect();
             let mut ends: HashMap<Slot, usize> = HashMap::new();
-            beams
-                .iter()
-                .flat_map(|beam| beam.array_windows::<2>())
-                .flatten()
-                .for_each(|&end| *ends.entry(end).or_default() += 1);
-            for connectivity in effects.iter().map(|effect| effect.connectivity()) {
-                for instance in connectivity.iter() {
-                    let mut nodes: Vec<Option<Slot>> = instance.iter().map(|slot| node_at.get(slot).copied()).collect();
-                    nodes.dedup();
-                    let acts_at_one = matches!(nodes[..], [_]);
-                    let is_element = matches!(nodes[..], [Some(a), Some(b)] if elements.contains(&[a, b]));
-                    if !acts_at_one && !is_element {
-                        not_plain.extend(nodes.into_iter().flatten());
-                    }
-                }
-            }
-            let is_plain = |slot: &Slot| ends[slot] == 2 && !not_plain.contains(slot);
+            elements.iter().flatten().for_each(|&end| *ends.entry(end).or_default() += 1);
+            let mut taken: HashSet<Slot> = self.acting.iter().copied().collect();
+            taken.extend(coupled(mesh, effects, &elements.into_iter().collect()));
+            let is_plain = |slot: &Slot| ends[slot] == 2 && !taken.contains(slot);
             beams.iter().map(|beam| beam.iter().skip(1).map(is_plain).collect()).collect()
         })
     }
+}
+
+/// The displacement slots of nodes that effects couple to others or to multipliers, but for elements of two nodes.
+fn coupled(mesh: &Mesh, effects: &[Arc<dyn Effect>], elements: &HashSet<[Slot; 2]>) -> HashSet<Slot> {
+    let slots = mesh.nodes.iter().flat_map(|at| [(at.node.u, at.node.u), (at.node.p, at.node.u)]);
+    let node_at: HashMap<Slot, Slot> = slots.collect();
+    let mut found = HashSet::new();
+    for connectivity in effects.iter().map(|effect| effect.connectivity()) {
+        for instance in connectivity.iter() {
+            let mut nodes: Vec<Option<Slot>> = instance.iter().map(|slot| node_at.get(slot).copied()).collect();
+            nodes.dedup();
+            let acts_at_one = nodes.len() == 1;
+            let is_element = matches!(nodes[..], [Some(start), Some(end)] if elements.contains(&[start, end]));
+            if !acts_at_one && !is_element {
+                found.extend(nodes.into_iter().flatten());
+            }
+        }
+    }
+    found
 }
 
 impl BeamPoints<'_> {
