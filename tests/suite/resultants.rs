@@ -1,8 +1,11 @@
 //! Strains and stress resultants along beams: in balance with reactions, and of higher order than the strains that
 //! elements have at their points.
 
+use super::folder::{Folder, status};
 use crate::random::Random;
 use crate::scenes::{Simulation, list, simulate};
+use std::collections::HashMap;
+use std::fs;
 
 const SECTION: &str =
     "[section.s]\nEA = 1e5\nGA = [2e4, 3e4]\nGJ = 8\nEI = [10, 20]\nrhoA = 1\nrhoJ = [2e-3, 1e-3, 1e-3]\n";
@@ -23,12 +26,16 @@ struct Cantilever<'a> {
 impl Cantilever<'_> {
     /// A run with columns at places.
     fn run(&self, order: usize, elements: usize, places: &[&str], columns: &str, stages: &str) -> Simulation {
+        simulate(&self.deck(order, elements, places, columns, stages))
+    }
+
+    fn deck(&self, order: usize, elements: usize, places: &[&str], columns: &str, stages: &str) -> String {
         let Self { line, interpolation, rest } = self;
-        simulate(&format!(
+        format!(
             "[effects]\nplanar = false\n{SECTION}[[beam]]\nname = \"arm\"\nsection = \"s\"\n{line}elements = {elements}\n\
              order = {order}\ninterpolation = \"{interpolation}\"\n[[support]]\nat = \"a\"\nfix = \"all\"\n{rest}\
              [output]\nnodes = {places:?}\ncolumns = {columns}\n{stages}"
-        ))
+        )
     }
 
     /// Forces and moments (local axes) at all places at the end of a run.
@@ -182,5 +189,29 @@ fn moments_balance_with_damping_forces() {
         let [force, moment] = ["a.N2", "a.M3"].map(|name| run.end(name));
         assert!((force / 0.1 - 0.875).abs() < 0.01, "order {order}: {force}");
         assert!((moment / 0.1 - 1.0).abs() < 0.01, "order {order}: {moment}");
+    }
+}
+
+/// Error bars hold the errors of resultants, and are not many times as long.
+#[test]
+fn error_bars_hold_the_errors_of_resultants() {
+    let folder = Folder::new("error_bars_of_resultants");
+    let beam = straight("[[load]]\nalong = \"arm\"\nforce = [-5, 9, 4]\n", "relative");
+    let exact = beam.run(3, 80, &["a", "arm@0.5"], "[\"resultant\"]", STATIC);
+    for order in 1..=3 {
+        folder.write("deck.toml", &beam.deck(order, 8, &["a", "arm@0.5"], "[\"resultant\"]", STATIC));
+        let run = folder.beamsim(&["run", "deck.toml", "--error-bars", "--out", "out"]);
+        assert_eq!(status(&run), 0, "{}", String::from_utf8_lossy(&run.stderr));
+        let history = fs::read_to_string(folder.0.join("out/history.csv")).unwrap();
+        let [names, last] = [history.lines().next(), history.lines().last()].map(|line| line.unwrap().split(','));
+        let row: HashMap<&str, f64> = names.zip(last.map(|value| value.parse().unwrap())).collect();
+        for column in ["a.N2", "a.M3", "arm@0.5.N2", "arm@0.5.M3"] {
+            let error = (row[column] - exact.end(column)).abs();
+            let bar = row[&*format!("{column}.err")];
+            assert!(
+                error <= bar && bar < 8.0 * error + 0.01 * row[column].abs(),
+                "order {order}, {column}: {error:e}, {bar:e}"
+            );
+        }
     }
 }

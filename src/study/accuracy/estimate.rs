@@ -32,7 +32,7 @@ pub struct Orders {
 enum Falls {
     /// Motions of nodes, and other columns that are not resultants
     Places,
-    /// Resultants: they depend on slopes, whose error has one order less
+    /// Resultants, strains and stresses: they depend on slopes
     Slopes,
 }
 
@@ -51,7 +51,8 @@ impl Falls {
         let order = order as f64;
         match self {
             Self::Places => Orders { assumed: order + 0.5, smooth: 2.0 * order },
-            Self::Slopes => Orders { assumed: order - 0.5, smooth: order },
+            // Elements of two nodes gain an order by balance, where they can.
+            Self::Slopes => Orders { assumed: (order - 0.5).max(1.0), smooth: order.max(2.0) },
         }
     }
 }
