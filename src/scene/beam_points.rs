@@ -8,10 +8,11 @@ use beamsim_core::system::Slot;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, OnceLock};
 
-/// Nodes within beams at which nothing acts but the two elements beside them, with their loads and masses: forces jump
-/// there only by what acts along the beam.
+/// Nodes within beams at which no concentrated force acts: forces jump there only by what acts along the beam (loads,
+/// gravity, inertia). What acts on rotations alone does not matter.
 pub struct PlainNodes {
-    /// Slots at which something acts
+    /// Slots at which supports, motions, loads, bodies, springs and contacts act; joints and sliders are found in the
+    /// effects
     acting: Vec<Slot>,
     /// For each beam, looked for when they are asked for first
     found: OnceLock<Vec<Arc<[bool]>>>,
@@ -31,8 +32,7 @@ pub struct BeamPoints<'a> {
 }
 
 impl PlainNodes {
-    /// Nodes of a scene with things that act at the slots `acting`. Joints and others that couple nodes are found in its
-    /// effects.
+    /// See `acting`.
     pub fn new(acting: Vec<Slot>) -> Self {
         Self { acting, found: OnceLock::new() }
     }
@@ -46,15 +46,15 @@ impl PlainNodes {
                 beams.iter().flat_map(|beam| beam.windows(2).map(|w| [w[0], w[1]])).collect();
             let mut ends: HashMap<Slot, usize> = HashMap::new();
             elements.iter().flatten().for_each(|&end| *ends.entry(end).or_default() += 1);
-            let mut taken: HashSet<Slot> = self.acting.iter().copied().collect();
-            taken.extend(coupled(mesh, effects, &elements.into_iter().collect()));
-            let is_plain = |slot: &Slot| ends[slot] == 2 && !taken.contains(slot);
-            beams.iter().map(|beam| beam.iter().skip(1).map(is_plain).collect()).collect()
+            let mut loaded_or_coupled: HashSet<Slot> = self.acting.iter().copied().collect();
+            loaded_or_coupled.extend(coupled(mesh, effects, &elements.into_iter().collect()));
+            let is_plain = |slot: &Slot| ends[slot] == 2 && !loaded_or_coupled.contains(slot);
+            beams.iter().map(|beam| beam[1..beam.len() - 1].iter().map(is_plain).collect()).collect()
         })
     }
 }
 
-/// The displacement slots of nodes that effects couple to others or to multipliers, but for elements of two nodes.
+/// The displacement slots of nodes that effects couple to others or to multipliers, except neighbours on a beam.
 fn coupled(mesh: &Mesh, effects: &[Arc<dyn Effect>], elements: &HashSet<[Slot; 2]>) -> HashSet<Slot> {
     let slots = mesh.nodes.iter().flat_map(|at| [(at.node.u, at.node.u), (at.node.p, at.node.u)]);
     let node_at: HashMap<Slot, Slot> = slots.collect();

@@ -192,6 +192,54 @@ fn moments_balance_with_damping_forces() {
     }
 }
 
+/// A beam that ends where another one goes on, with a third one listed between them, and a beam that is pressed on a ball:
+/// what others do at a node is not taken for a force along the beam.
+#[test]
+fn neighbours_are_elements_of_the_beam() {
+    let beam = |name: &str, ends: &str, elements: usize| {
+        format!("[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = {ends}\nelements = {elements}\norder = 1\n")
+    };
+    let start = "[point]\na = [0, 0, 0]\nb = [0.25, 0, 0]\nc = [1, 0, 0]\nd = [0, 0, 3]\ne = [1, 0, 3]\n";
+    let others = beam("other", "[\"d\", \"e\"]", 3) + &beam("rest", "[\"b\", \"c\"]", 3);
+    let scene = format!(
+        "[effects]\nplanar = false\n{SECTION}{start}{}{others}[[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"d\"\nfix = \"all\"\n\
+         [[load]]\nat = \"c\"\nforce = [0, 1, 0]\n[[load]]\nat = \"e\"\nforce = [0, -7, 2]\n\
+         [output]\nnodes = [\"first@0.9\", \"rest@0.1\", \"other@0.5\"]\ncolumns = [\"resultant\"]\n{STATIC}",
+        beam("first", "[\"a\", \"b\"]", 1)
+    );
+    let run = simulate(&scene);
+    for (column, expected) in [("first@0.9.N2", 1.0), ("rest@0.1.N2", 1.0), ("other@0.5.N2", -7.0)] {
+        assert!((run.end(column) / expected - 1.0).abs() < 0.03, "{column}: {}", run.end(column));
+    }
+    let ball = "[[surface]]\nname = \"ball\"\nkind = \"sphere\"\nat = [0.3, 0.2, 0]\nradius = 0.15\n\
+                [[contact]]\nname = \"touch\"\nbeams = [\"arm\"]\nsurfaces = [\"ball\"]\nradius = 0.04\n[[load]]\nat = \"b\"\nforce = [0, 8, 0]\n";
+    let run = straight(ball, "relative").run(1, 4, &["a"], "[\"resultant\", \"reaction\"]", &STATIC.replace("4", "20"));
+    let [shear, reaction] = ["a.N2", "a.fy"].map(|name| run.end(name));
+    assert!(reaction > 1.0 && (shear / -reaction - 1.0).abs() < 0.1, "{shear}, {reaction}");
+}
+
+/// The envelope of a beam with a moment in its middle: both sides have half of it.
+#[test]
+fn envelopes_take_both_sides_of_a_node() {
+    let folder = Folder::new("envelope_of_jump");
+    let deck = "[point]\na = [0, 0, 0]\nm = [1, 0, 0]\nb = [2, 0, 0]\n[material.steel]\nE = 2e11\nnu = 0.3\nrho = 7850\n\
+        [section.s]\nmaterial = \"steel\"\nshape = \"rectangle\"\nwidth = 0.1\nheight = 0.1\n[[beam]]\nname = \"arm\"\nsection = \"s\"\n\
+        through = [\"a\", \"m\", \"b\"]\nelements = [1, 1]\n[[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\"]\n\
+        [[support]]\nat = \"b\"\nfix = [\"uy\", \"uz\"]\n[[load]]\nat = \"m\"\nmoment = [0, 0, 1000]\n\
+        [output]\nnodes = [\"m\"]\nenvelope = true\n[[stage]]\nkind = \"static\"\nsteps = 2\n";
+    folder.write("deck.toml", deck);
+    let run = folder.beamsim(&["run", "deck.toml", "--out", "out"]);
+    assert_eq!(status(&run), 0, "{}", String::from_utf8_lossy(&run.stderr));
+    let table = fs::read_to_string(folder.0.join("out/stress.csv")).unwrap();
+    let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let at = names.iter().position(|name| *name == "vm").unwrap();
+    let largest = lines.map(|line| line[at].parse::<f64>().unwrap()).fold(0.0, f64::max);
+    // M / W with W = b h^2 / 6
+    let expected = 500.0 * 6.0 / 1e-3;
+    assert!((largest / expected - 1.0).abs() < 0.01, "{largest} for {expected}");
+}
+
 /// Error bars hold the errors of resultants, and are not many times as long.
 #[test]
 fn error_bars_hold_the_errors_of_resultants() {

@@ -52,9 +52,9 @@ pub struct StressPoint {
     pub stress: PointStress,
 }
 
-/// Strains and stresses of the elements that were looked at last, at one state: neighbouring points
+/// The strains and stresses of elements that were asked for last, at one state: neighbouring points
 /// share elements.
-pub struct SeenElements<'a> {
+pub struct ElementCache<'a> {
     /// The state
     pub(super) state: &'a State,
     /// The state about which the stage is linear; `None` in other stages
@@ -63,10 +63,10 @@ pub struct SeenElements<'a> {
     seen: VecDeque<(u32, Option<Arc<ElementStresses>>)>,
 }
 
-/// Elements that are kept: those around a point.
-const KEPT: usize = 4;
+/// Number of elements that are kept: the two beside a node, and two neighbours of each.
+const KEPT: usize = 6;
 
-impl<'a> SeenElements<'a> {
+impl<'a> ElementCache<'a> {
     /// Elements at a state. `origin` is the state about which the stage is linear; `None` in other
     /// stages.
     pub fn new(state: &'a State, origin: Option<&'a State>) -> Self {
@@ -87,46 +87,52 @@ impl<'a> SeenElements<'a> {
 impl BeamPoint {
     /// N and M in section axes, see [`strain_and_stress`](Self::strain_and_stress).
     pub fn resultant(&self, state: &State, origin: Option<&State>) -> Vector6 {
-        Vector6::from(self.strain_and_stress(&mut SeenElements::new(state, origin))[1])
+        Vector6::from(self.strain_and_stress(&mut ElementCache::new(state, origin))[1])
     }
 
-    /// Gamma and K, then N and M, in section axes: see [`ElementStresses`]; mean of both sides.
-    pub fn strain_and_stress(&self, seen: &mut SeenElements) -> [[f64; 6]; 2] {
-        let mut mean = [[0.0; 6]; 2];
-        for &(element, xi) in &self.sides {
-            let Some(stresses) = seen.element(element, &self.elasticity) else { continue };
-            let along = if stresses.hides_force_along() { self.force_along(element, seen) } else { Vec3::ZERO };
+    /// Gamma and K, then N and M, in section axes; mean of both sides.
+    pub fn strain_and_stress(&self, cache: &mut ElementCache) -> [[f64; 6]; 2] {
+        let sides = self.at_sides(cache);
+        let mean = |part: usize, k: usize| sides.iter().map(|side| side[part][k]).sum::<f64>() / sides.len() as f64;
+        [0, 1].map(|part| std::array::from_fn(|k| mean(part, k)))
+    }
+
+    /// Gamma and K, then N and M, in section axes, on each side: see [`ElementStresses`].
+    pub fn at_sides(&self, cache: &mut ElementCache) -> Vec<[[f64; 6]; 2]> {
+        let local = |v: Vec3| self.frame.transpose_mul(v).0;
+        let mut of_side = |&(element, xi): &(u32, f64)| {
+            let stresses = cache.element(element, &self.elasticity)?;
+            let along = if stresses.hides_force_along() { self.force_along(element, cache) } else { Vec3::ZERO };
             let (strain, stress) = stresses.at(xi, along);
-            let local = |v: Vec3| self.frame.transpose_mul(v).0;
-            let values = [[local(strain.gamma), local(strain.kappa)], [local(stress.n), local(stress.m)]];
-            for (sum, part) in mean.iter_mut().flatten().zip(values.as_flattened().as_flattened()) {
-                *sum += part / self.sides.len() as f64;
-            }
-        }
-        mean
+            let six = |a: Vec3, b: Vec3| [local(a), local(b)].as_flattened().try_into().expect("two times three");
+            Some([six(strain.gamma, strain.kappa), six(stress.n, stress.m)])
+        };
+        self.sides.iter().filter_map(&mut of_side).collect()
     }
 
     /// The force per length on an element (material, global components), from the jumps of the force
-    /// at its ends, where these are plain. Where they differ the shorter one counts, and none where
-    /// they point apart.
-    fn force_along(&self, element: u32, seen: &mut SeenElements) -> Vec3 {
-        let BeamElements { first, plain } = &self.elements;
-        let mut jump_behind = |before: u32| {
-            let is_plain = plain.get((before - first) as usize).copied().unwrap_or(false);
-            let mut of = |number: u32| seen.element(number, &self.elasticity);
+    /// at its ends, where these are plain; with one plain end also from the jump at the next node. Of
+    /// two the shorter counts, and none where the angle between them is not below 90 degrees:
+    /// concentrated forces make single jumps.
+    fn force_along(&self, element: u32, cache: &mut ElementCache) -> Vec3 {
+        // Nodes by the number of the element before them.
+        let mut at_node = |before: i64| {
+            let number = before - i64::from(self.elements.first);
+            let is_plain = usize::try_from(number).is_ok_and(|k| self.elements.plain.get(k) == Some(&true));
+            let mut of = |number: i64| cache.element(number as u32, &self.elasticity);
             is_plain.then(|| Some(of(before)?.force_along(&*of(before + 1)?))).flatten()
         };
-        let start = if element > *first { jump_behind(element - 1) } else { None };
-        match [start, jump_behind(element)] {
-            [Some(start), Some(end)] if start.dot(end) <= 0.0 => Vec3::ZERO,
-            [Some(start), Some(end)] => {
-                if start.squared() < end.squared() {
-                    start
-                } else {
-                    end
-                }
-            }
-            [start, end] => start.or(end).unwrap_or(Vec3::ZERO),
+        let element = i64::from(element);
+        let [one, other] = match [at_node(element - 1), at_node(element)] {
+            [Some(start), Some(end)] => [Some(start), Some(end)],
+            [Some(start), None] => [Some(start), at_node(element - 2)],
+            [None, Some(end)] => [Some(end), at_node(element + 1)],
+            [None, None] => [None, None],
+        };
+        match [one, other] {
+            [Some(one), Some(other)] if one.dot(other) <= 0.0 => Vec3::ZERO,
+            [Some(one), Some(other)] if other.squared() < one.squared() => other,
+            [one, _] => one.unwrap_or(Vec3::ZERO),
         }
     }
 }

@@ -4,7 +4,7 @@
 //! A new group of columns is a row of [`COLUMNS`] and the function that reads it. Histories,
 //! expectations, error scales, pictures and the report ask the row.
 
-use super::beam_point::{BeamPoint, SeenElements, StressPlace, StressPoint};
+use super::beam_point::{BeamPoint, ElementCache, StressPlace, StressPoint};
 use super::place::Place;
 use super::quantity::Quantity;
 use crate::kernel::inertia::Spin;
@@ -170,7 +170,7 @@ pub static COLUMNS: [ColumnGroup; 21] = [
             part("section moment", Quantity::SectionMoment, &["M1", "M2", "M3"]),
         ],
         source: Source::BeamPoint(|point, at, out| {
-            out.extend(point.strain_and_stress(&mut SeenElements::new(at.state, at.origin))[1])
+            out.extend(point.strain_and_stress(&mut ElementCache::new(at.state, at.origin))[1])
         }),
         needs: &[],
         nearest: None,
@@ -182,7 +182,7 @@ pub static COLUMNS: [ColumnGroup; 21] = [
             part("change of curvature", Quantity::Curvature, &["K1", "K2", "K3"]),
         ],
         source: Source::BeamPoint(|point, at, out| {
-            out.extend(point.strain_and_stress(&mut SeenElements::new(at.state, at.origin))[0])
+            out.extend(point.strain_and_stress(&mut ElementCache::new(at.state, at.origin))[0])
         }),
         needs: &[],
         nearest: None,

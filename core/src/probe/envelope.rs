@@ -1,6 +1,6 @@
 //! The largest stresses over the time of a run, at places along beams.
 
-use super::beam_point::{SeenElements, StressPlace};
+use super::beam_point::{ElementCache, StressPlace};
 use super::largest_row::{Extreme, LargestRow, Row};
 use crate::run::Snapshot;
 use crate::section::recovery::{Criterion, PlacedRecovery};
@@ -74,12 +74,14 @@ impl Envelope {
     /// Takes a converged state.
     pub fn row(&mut self, at: &Snapshot) {
         let moment = at.moment();
-        let mut seen = SeenElements::new(at.state, at.origin);
+        let mut cache = ElementCache::new(at.state, at.origin);
         for (place, Followed { von_mises, index }) in self.places.iter().zip(&mut self.followed) {
-            let resultant = place.inside.strain_and_stress(&mut seen)[1];
-            von_mises.row(&place.section, Criterion::VonMises, Row { moment, resultant });
-            if has_own_index(&place.section) {
-                index.row(&place.section, Criterion::FailureIndex, Row { moment, resultant });
+            // At a node with a force or a moment both sides differ.
+            for [_, resultant] in place.inside.at_sides(&mut cache) {
+                von_mises.row(&place.section, Criterion::VonMises, Row { moment, resultant });
+                if has_own_index(&place.section) {
+                    index.row(&place.section, Criterion::FailureIndex, Row { moment, resultant });
+                }
             }
         }
     }

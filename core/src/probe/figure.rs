@@ -1,7 +1,7 @@
 //! The whole shape of a scene, for pictures: every node of every beam with its section axes,
 //! strains and resultants.
 
-use super::beam_point::{BeamPoint, SeenElements};
+use super::beam_point::{BeamPoint, ElementCache};
 use super::place::Place;
 use crate::effect::contact::{ContactParty, SurfaceContacts};
 use crate::rotation::{Rotation, principal};
@@ -75,8 +75,8 @@ impl Figure {
     pub fn looks(&self, state: &State, origin: Option<&State>) -> Vec<Look> {
         let points = self.lines.iter().flat_map(|line| &line.points);
         let others = self.bodies.iter().chain(self.links.as_flattened());
-        let mut seen = SeenElements::new(state, origin);
-        points.map(|point| point.look(&mut seen)).chain(others.map(|place| bare(place, state))).collect()
+        let mut cache = ElementCache::new(state, origin);
+        points.map(|point| point.look(&mut cache)).chain(others.map(|place| bare(place, state))).collect()
     }
 
     /// Largest von Mises stress of the section at each look; not a number where it is not known.
@@ -125,12 +125,12 @@ impl Figure {
 }
 
 impl LinePoint {
-    fn look(&self, seen: &mut SeenElements) -> Look {
-        let [strain, resultant] = self.inside.strain_and_stress(seen);
+    fn look(&self, cache: &mut ElementCache) -> Look {
+        let [strain, resultant] = self.inside.strain_and_stress(cache);
         let row = |row: &[f64; 6]| row.iter().zip(&resultant).map(|(c, s)| c * s).sum::<f64>();
         // Energy of the strains that have stress: free strains have none.
         let energy = 0.5 * self.compliance.iter().zip(&resultant).map(|(c, s)| s * row(c)).sum::<f64>();
-        Look { strain, resultant, energy, ..bare(&self.place, seen.state) }
+        Look { strain, resultant, energy, ..bare(&self.place, cache.state) }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Resultants along whole beams at the end of each stage.
 
-use super::beam_point::{BeamPoint, SeenElements};
+use super::beam_point::{BeamPoint, ElementCache};
 use crate::run::{Moment, Snapshot};
 use crate::section::recovery::PlacedRecovery;
 use serde::{Deserialize, Serialize};
@@ -47,8 +47,8 @@ impl Profile {
 
     /// Takes a converged state.
     pub fn row(&mut self, at: &Snapshot) {
-        let mut seen = SeenElements::new(at.state, at.origin);
-        let of_place = |place: &ProfilePlace| place.inside.strain_and_stress(&mut seen)[1];
+        let mut cache = ElementCache::new(at.state, at.origin);
+        let of_place = |place: &ProfilePlace| place.inside.strain_and_stress(&mut cache)[1];
         let end = StageEnd { moment: at.moment(), resultants: self.places.iter().map(of_place).collect() };
         self.ends.retain(|known| known.moment.stage != at.stage);
         self.ends.push(end);

@@ -19,7 +19,7 @@ impl Composer<'_> {
             let Some(amplitude) = self.amplitude_of_load(load) else { continue };
             let Some(frame) = self.load_axes(load, at, node, on) else { continue };
             let node = self.mesh.nodes[node].node;
-            self.out.loaded.push(node);
+            self.out.loaded.extend(load.force.map(|_| node));
             let at_node = |vector: LoadVector| NodeForce { node, vector: frame * Vec3(vector.start), amplitude };
             let own = loads.in_frame(load.frame);
             own.forces.extend(load.force.map(at_node));

@@ -73,7 +73,7 @@ pub struct Composition {
     pub(super) links: Vec<Link>,
     /// Springs to ground
     pub(super) springs: Vec<GroundSpring>,
-    /// Nodes with a [[load]] `at` them
+    /// Nodes with a force of a [[load]]
     pub(super) loaded: Vec<Node>,
     /// Slots of multipliers, behind those of the mesh: what they hold, and the joint
     pub(super) multipliers: Vec<(SlotKind, String)>,
@@ -90,12 +90,13 @@ pub struct Composition {
 }
 
 impl Composition {
-    /// Slots of displacements at which loads, bodies and springs act.
+    /// Slots of displacements at which loads, bodies, springs and contacts act.
     pub fn acting_at_nodes(&self) -> impl Iterator<Item = Slot> {
         let bodies = self.bodies.iter().map(|body| body.node);
         let springs = self.springs.iter().map(|spring| spring.node);
         let links = self.links.iter().flat_map(|link| link.nodes);
-        self.loaded.iter().copied().chain(bodies).chain(springs).chain(links).map(|node| node.u)
+        let touching = self.contacts.iter().flat_map(|contacts| contacts.nodes_of_beams());
+        self.loaded.iter().copied().chain(bodies).chain(springs).chain(links).chain(touching).map(|node| node.u)
     }
 
     /// Lengths of bodies: radii of gyration and of contact.

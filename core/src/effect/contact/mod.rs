@@ -71,6 +71,13 @@ pub struct SurfaceContacts {
 }
 
 impl SurfaceContacts {
+    /// The nodes of all beams that may touch something.
+    pub fn nodes_of_beams(&self) -> impl Iterator<Item = crate::system::Node> {
+        let chains = self.chains.iter().map(|chain| &chain.strand);
+        let beams = chains.chain(self.pairs.strands()).filter(|strand| strand.beam.is_some());
+        beams.flat_map(|strand| strand.nodes.iter().map(|at| at.node))
+    }
+
     /// Chains whose contact acts in a state, with its laws and the surface.
     fn acting<'a>(&'a self, at: &'a State) -> impl Iterator<Item = (&'a Chain, &'a ContactLaws, &'a SceneSurface)> {
         let with_parts = |chain: &'a Chain| (chain, &self.laws[chain.contact], &self.surfaces[chain.surface]);

@@ -12,9 +12,10 @@
 //!
 //! L_g are the polynomials that are one at point g and zero at the others. K and M' are known at the
 //! points, and follow the polynomials through them. Forces p and moments per length, with those of
-//! inertia, come in by the differences between the points. A single point does not show p: it is
-//! taken from the jumps of N at the nodes of the element, which nodal forces make, too. Moments at
-//! the ends of an element of two nodes then are those of its points, since loads act at its nodes:
+//! inertia, enter through the differences between the points, where there are several. The single
+//! point of an element of two nodes shows neither: p is taken from the jumps of N at its nodes,
+//! moments per length are left out. Moments at its ends are those of the point and of N, since loads
+//! act at the nodes:
 //!
 //! ```text
 //! N(s) -= p s,   M(s) += y x p (s^2 - h^2/4) / 2     s from the middle, h the length
@@ -56,8 +57,8 @@ struct StressedPoint {
     tangent: Vec3,
     /// Initial length over xi
     stretch: f64,
-    /// Strains over elastic stresses
-    compliance: Matrix6,
+    /// Elastic stresses over strains
+    stiffness: Stiffness,
 }
 
 impl ElementStresses {
@@ -70,18 +71,15 @@ impl ElementStresses {
     /// Strain and elastic stress at `xi` on [-1, 1], under the force per length `along`, which is
     /// zero for elements with several points.
     pub fn at(&self, xi: f64, along: Vec3) -> (Strain, Stress) {
-        let mut strain = Vector6::zeros();
-        let mut stress = Vector6::zeros();
-        for (g, point) in self.points.iter().enumerate() {
-            let share = lagrange(&self.xi, g, xi);
-            let change = self.change(g, xi) + point.change_along(xi, along);
-            strain += point.strain_vector() * share;
-            stress += (now(&point.elastic) + change) * share;
-            for (k, other) in self.points.iter().enumerate() {
-                strain += other.compliance * change * (share * lagrange(&self.xi, k, xi));
-            }
-        }
-        (strain_of(&strain), stress_of(&stress))
+        let share = |g: usize| lagrange(&self.xi, g, xi);
+        let each = || self.points.iter().enumerate();
+        let elastic: Vector6 = each().map(|(g, point)| now(&point.elastic) * share(g)).sum();
+        let change = match &self.points[..] {
+            [point] => point.elastic_part(&(self.change(0, xi) + point.change_along(xi, along))),
+            _ => each().map(|(g, _)| self.change(g, xi) * share(g)).sum(),
+        };
+        let strain = each().map(|(g, point)| (point.strain_vector() + point.compliance() * change) * share(g)).sum();
+        (strain_of(&strain), stress_of(&(elastic + change)))
     }
 
     /// True for an element with a single point, which does not show the force along it.
@@ -89,8 +87,8 @@ impl ElementStresses {
         self.points.len() == 1
     }
 
-    /// The force per length, with that of inertia, that the jump of the force at the node between
-    /// this element and the next one of the beam stands for.
+    /// The force per length, with that of inertia: the jump of the force at the node between this
+    /// element and the next one of the beam, over half of each element.
     pub fn force_along(&self, next: &Self) -> Vec3 {
         let length = 0.5 * (self.length() + next.length());
         (self.force_at(1.0) - next.force_at(-1.0)) * (1.0 / length)
@@ -124,7 +122,7 @@ impl ElementStresses {
     /// The integrals of the polynomials L_g over xi.
     fn integrals(&self, from: f64, to: f64) -> Vec<f64> {
         let half = 0.5 * (to - from);
-        // Two points integrate polynomials of degree three, that of four points.
+        // L_g has at most degree two, which two points integrate exactly.
         let at = |k: usize, &(abscissa, weight): &(f64, f64)| {
             half * weight * lagrange(&self.xi, k, from + half * (1.0 + abscissa))
         };
@@ -150,6 +148,27 @@ impl StressedPoint {
     fn strain_vector(&self) -> Vector6 {
         let Strain { gamma, kappa } = self.strain_now();
         vector(&Stress { n: gamma, m: kappa })
+    }
+
+    /// Strains over elastic stresses. Strains of a singular section do not follow the stresses.
+    fn compliance(&self) -> Matrix6 {
+        let column = |k: usize| vector(&self.stiffness.stress(&strain_of(&Vector6::ith(k, 1.0))));
+        Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(column)).try_inverse().unwrap_or_default()
+    }
+
+    /// The elastic part of a change of force and moment along the element: that of the forces, and of
+    /// the moments, at this point.
+    fn elastic_part(&self, change: &Vector6) -> Vector6 {
+        let part = |elastic: &Vec3<Jet>, damping: &Vec3<Jet>| {
+            let [elastic, damping] = [sum(elastic), sum(damping)];
+            let total = elastic + damping;
+            // Without damping the part is one, to the last digit.
+            if damping == Vec3::ZERO { 1.0 } else { (elastic.dot(total) / total.squared()).clamp(0.0, 1.0) }
+        };
+        let Stress { n, m } = stress_of(change);
+        let of_forces = part(&self.elastic.n, &self.damping.n);
+        let of_moments = part(&self.elastic.m, &self.damping.m);
+        vector(&Stress { n: n * of_forces, m: m * of_moments })
     }
 
     fn total(&self) -> Stress<Jet> {
@@ -189,7 +208,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
             let NodePlace { u, p } = view.nodes()[i];
             NodePlace { u: with_change(u, change[i].0), p: with_change(p, change[i].1) }
         });
-        // Free strains are loads of a linear stage, without geometric stiffness.
+        // Free strains act as loads of a linear stage: its geometric stiffness leaves their stresses
+        // out.
         let free = self.free_amplitude(at);
         let [value, rate] = if origin.is_some() { [0.0, free] } else { [free, 0.0] };
         let free = Jet { value, rate, rate2: 0.0 };
@@ -201,7 +221,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
                 damping: Stress { n: Vec3::zero(), m: Vec3::zero() },
                 tangent: point.tangent,
                 stretch: point.weight / weight,
-                compliance: compliance(&point.law.stiffness_at_rest()),
+                stiffness: point.law.stiffness_at_rest(),
             }
         };
         ElementStresses {
@@ -209,12 +229,6 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
             points: self.points().iter().zip(gauss(G)).map(of_point).collect(),
         }
     }
-}
-
-/// Strains over elastic stresses of a section, in global components.
-fn compliance(stiffness: &Stiffness) -> Matrix6 {
-    let column = |k: usize| vector(&stiffness.stress(&strain_of(&Vector6::ith(k, 1.0))));
-    Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(column)).try_inverse().unwrap_or_default()
 }
 
 /// A vector with its change in a linear stage.

@@ -127,7 +127,8 @@ impl<I: Interpolation> StressField for StrainRateDamping<I> {
         for_each_batch!(self.elasticity.elements, |first, batch| {
             if let Some(k) = find(batch, element) {
                 let mut stresses = batch[k].stresses::<I>(at, origin);
-                // Damping in proportion to the stiffness leaves elastic stresses in balance.
+                // Damping in proportion to the stiffness leaves elastic stresses in balance while
+                // curvatures change little within the time beta.
                 if let Viscosity::Points(_) = self.viscosity {
                     let damping = self.viscosity.of_element(first + k, &starts);
                     stresses

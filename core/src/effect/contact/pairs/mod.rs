@@ -69,6 +69,11 @@ struct ElementOf {
 }
 
 impl BeamPairs {
+    /// The beams.
+    pub fn strands(&self) -> &[Strand] {
+        &self.strands
+    }
+
     /// Meetings of beams: each strand is a beam with its name. `connected` has the slots of
     /// displacement of nodes that joints connect.
     pub fn new(beams: Vec<(String, Strand)>, meetings: Vec<Meeting>, connected: &[[Slot; 2]]) -> Self {
