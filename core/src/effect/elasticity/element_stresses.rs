@@ -162,8 +162,10 @@ impl StressedPoint {
         let part = |elastic: &Vec3<Jet>, damping: &Vec3<Jet>| {
             let [elastic, damping] = [sum(elastic), sum(damping)];
             let total = elastic + damping;
+            let square = total.squared();
             // Without damping the part is one, to the last digit.
-            if damping == Vec3::ZERO { 1.0 } else { (elastic.dot(total) / total.squared()).clamp(0.0, 1.0) }
+            let is_whole = damping == Vec3::ZERO || square == 0.0;
+            if is_whole { 1.0 } else { (elastic.dot(total) / square).clamp(0.0, 1.0) }
         };
         let Stress { n, m } = stress_of(change);
         let of_forces = part(&self.elastic.n, &self.damping.n);
