@@ -61,16 +61,19 @@ pub struct ElementCache<'a> {
     origin: Option<&'a State>,
     /// Elements by their numbers
     seen: VecDeque<(u32, Option<Arc<ElementStresses>>)>,
+    /// Forces per length from the jumps at nodes, by the number of the element before the node
+    jumps: VecDeque<(u32, Option<Vec3>)>,
 }
 
-/// Number of elements that are kept: the two beside a node, and two neighbours of each.
+/// Number of elements, and of nodes, that are kept: the two beside a node, and two neighbours of
+/// each.
 const KEPT: usize = 6;
 
 impl<'a> ElementCache<'a> {
     /// Elements at a state. `origin` is the state about which the stage is linear; `None` in other
     /// stages.
     pub fn new(state: &'a State, origin: Option<&'a State>) -> Self {
-        Self { state, origin, seen: VecDeque::new() }
+        Self { state, origin, seen: VecDeque::new(), jumps: VecDeque::new() }
     }
 
     fn element(&mut self, number: u32, elasticity: &[Arc<dyn StressField>]) -> Option<Arc<ElementStresses>> {
@@ -80,6 +83,18 @@ impl<'a> ElementCache<'a> {
         let found = elasticity.iter().find_map(|field| field.stresses(number, self.state, self.origin)).map(Arc::new);
         self.seen.truncate(KEPT - 1);
         self.seen.push_front((number, found.clone()));
+        found
+    }
+
+    /// The force per length from the jump at the node between an element and the next one.
+    fn jump(&mut self, before: u32, elasticity: &[Arc<dyn StressField>]) -> Option<Vec3> {
+        if let Some(&(_, known)) = self.jumps.iter().find(|(seen, _)| *seen == before) {
+            return known;
+        }
+        let [this, next] = [before, before + 1].map(|number| self.element(number, elasticity));
+        let found = this.zip(next).map(|(this, next)| this.force_along(&next));
+        self.jumps.truncate(KEPT - 1);
+        self.jumps.push_front((before, found));
         found
     }
 }
@@ -119,8 +134,7 @@ impl BeamPoint {
         let mut at_node = |before: i64| {
             let number = before - i64::from(self.elements.first);
             let is_plain = usize::try_from(number).is_ok_and(|k| self.elements.plain.get(k) == Some(&true));
-            let mut of = |number: i64| cache.element(number as u32, &self.elasticity);
-            is_plain.then(|| Some(of(before)?.force_along(&*of(before + 1)?))).flatten()
+            if is_plain { cache.jump(before as u32, &self.elasticity) } else { None }
         };
         let element = i64::from(element);
         let [one, other] = match [at_node(element - 1), at_node(element)] {
