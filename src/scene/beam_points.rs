@@ -11,8 +11,7 @@ use std::sync::{Arc, OnceLock};
 /// Nodes within beams at which no concentrated force acts: forces jump there only by what acts along the beam (loads,
 /// gravity, inertia). What acts on rotations alone does not matter.
 pub struct PlainNodes {
-    /// Slots at which supports, motions, loads, bodies, springs and contacts act; joints and sliders are found in the
-    /// effects
+    /// Slots at which something acts; joints and sliders are not among them, but found in the effects
     acting: Vec<Slot>,
     /// For each beam, looked for when they are asked for first
     found: OnceLock<Vec<Arc<[bool]>>>,
@@ -32,7 +31,7 @@ pub struct BeamPoints<'a> {
 }
 
 impl PlainNodes {
-    /// See `acting`.
+    /// Nodes of a scene in which supports, motions, loads, bodies, springs and contacts act at the slots `acting`.
     pub fn new(acting: Vec<Slot>) -> Self {
         Self { acting, found: OnceLock::new() }
     }
