@@ -8,7 +8,8 @@ patch names, decks (by `beamsim verify`) or a test (by `cargo test`), then fails
 A patch begins with lines `# mistake:`, `# names:` (decks, or `test module::name`), `# why:`. A mutant that does not
 apply or build is an error, not a success; `--applies` only looks whether each one applies. Exit status: 0 all found,
 1 a mutant survives, 2 an error of the suite.
-Builds are incremental; where one has been killed and the next does not link, remove the target folder.
+Builds are incremental and without optimisation; where one has been killed and the next does not link, remove the
+target folder.
 """
 
 import argparse
@@ -23,6 +24,8 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
+# Without optimisation a mutant is built in half a minute.
+PROFILE = ["--profile", "mutations"]
 
 
 class SuiteError(Exception):
@@ -55,7 +58,7 @@ class Copy:
         self.folder, self.target, self.timeout = folder, target, timeout
         # A repository around the copy would make `git apply` skip the patch.
         ceiling = {"GIT_CEILING_DIRECTORIES": str(folder.parent)}
-        self.environment = os.environ | ceiling | {"CARGO_TARGET_DIR": str(target), "CARGO_INCREMENTAL": "1"}
+        self.environment = os.environ | ceiling | {"CARGO_TARGET_DIR": str(target)}
         listed = subprocess.run(["git", "ls-files", "-z", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True)
         for name in filter(None, listed.stdout.decode().split("\0")):
             if (ROOT / name).is_file():
@@ -78,20 +81,20 @@ class Copy:
 
     def build(self, mutant):
         if mutant.decks:
-            self.must(["cargo", "build", "--release"])
+            self.must(["cargo", "build", *PROFILE])
         if mutant.tests:
-            self.must(["cargo", "test", "--release", "--test", "suite", "--no-run"])
+            self.must(["cargo", "test", *PROFILE, "--test", "suite", "--no-run"])
 
     def verify(self, deck):
         """How a deck fails; None where it holds."""
         if not (self.folder / deck).is_file():
             raise SuiteError(f"there is no {deck}")
-        status, stdout, stderr = self.call([self.target / "release" / "beamsim", "verify", deck], self.timeout)
+        status, stdout, stderr = self.call([self.target / PROFILE[1] / "beamsim", "verify", deck], self.timeout)
         return None if status == 0 else first_failure(status, stdout, stderr, self.timeout)
 
     def test(self, name):
         """How a test fails; None where it passes."""
-        command = ["cargo", "test", "--release", "--test", "suite", name, "--", "--exact"]
+        command = ["cargo", "test", *PROFILE, "--test", "suite", name, "--", "--exact"]
         status, stdout, _ = self.call(command, 10 * self.timeout)
         if status is not None and f"test {name} ... " not in stdout:
             raise SuiteError(f"there is no test {name}")
