@@ -31,6 +31,7 @@ mod laws;
 mod layers;
 mod linear_stages;
 mod masses;
+mod massless_joints;
 mod mechanics;
 mod mechanisms;
 mod modes;

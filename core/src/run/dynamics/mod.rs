@@ -4,6 +4,7 @@ mod adaptive;
 pub(super) mod checkpoint;
 mod grid;
 mod judgement;
+mod massless;
 mod middle;
 mod smooth_start;
 mod start;

@@ -2,19 +2,19 @@
 //! instant.
 
 use super::Dynamics;
+use super::massless::Massless;
 use crate::integrate::Method;
 use crate::kernel::Weights;
-use crate::model::{LARGEST_GAP, Model, SlotKind, StageError};
+use crate::model::{LARGEST_GAP, SlotKind, StageError};
 use crate::run::energy::Entry;
 use crate::run::failure::Failure;
 use crate::run::spatial::SpatialLook;
 use crate::run::stage_run::StageRun;
 use crate::solve::{NewtonFailure, SoftMode, Tangent, mechanism};
-use crate::system::{DofMap, Slot, State, System};
-use crate::tensor::{Mat3, Vec3};
+use crate::system::{Slot, State};
+use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
-use nalgebra::{Matrix3, SymmetricEigen};
 
 /// Relative change of a velocity that is round-off.
 const ROUND_OFF: f64 = 1e-9;
@@ -270,18 +270,19 @@ impl Dynamics<'_, '_> {
         }
         let mut right_hand_side = vec![0.0; system.pattern.dof_map.count()];
         system.right_hand_side(&mut right_hand_side);
-        let additions = massless_blocks(system, model, &mut right_hand_side);
-        additions.iter().for_each(|(slot, block)| system.add_to_own_block(*slot, block));
+        let massless = Massless::find(system, model, &mut right_hand_side);
+        massless.additions.iter().for_each(|(slot, block)| system.add_to_own_block(*slot, block));
         counters.work.factorisations += 1;
-        let mut mass = Tangent::that_may_go(assembly, state, Weights::MASS).with(&additions);
+        let mut mass = Tangent::that_may_go(assembly, state, Weights::MASS).with(&massless.additions);
         // Along no axis round-off leaves pivots where the mass matrix is singular: solved with,
         // they give accelerations of 1e16.
-        let massless = solver.null_vector(&mut mass);
-        let factorised = massless.is_none() && solver.factorise_new(&mut mass).is_done;
+        let without_mass = solver.null_vector(&mut mass);
+        let factorised = without_mass.is_none() && solver.factorise_new(&mut mass).is_done;
         let system = mass.system();
-        if !factorised || !solver.solve(system, &mut right_hand_side) {
+        let solve = |right_hand_side: &mut [f64]| solver.solve(system, right_hand_side);
+        if !factorised || !massless.solve(&system.pattern.dof_map, &mut right_hand_side, solve) {
             self.stage.unless_interrupted()?;
-            let named = self.stage.name_mechanism(massless, &self.stage.assembly.system);
+            let named = self.stage.name_mechanism(without_mass, &self.stage.assembly.system);
             return if self.is_held(&named) { Ok(None) } else { Err(named) };
         }
         let mut solved = vec![Vec3::ZERO; state.q.len()];
@@ -302,54 +303,6 @@ impl Dynamics<'_, '_> {
             && SoftMode::find(&mut newton.solver, &mut tangent, model, false)
                 .is_none_or(|soft_mode| !soft_mode.is_loose())
     }
-}
-
-/// Directions without mass take no acceleration: their part of the mass matrix is replaced by one
-/// that leaves them at zero. They are the null directions of the diagonal blocks; what is to be
-/// added to these.
-fn massless_blocks(system: &System, model: &Model, right_hand_side: &mut [f64]) -> Vec<(Slot, Mat3)> {
-    let mut additions = Vec::new();
-    let is_massive = threads::list(model.slots(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
-    // Sliding follows from the gaps.
-    let moves = |slot: &usize| matches!(model.kinds[*slot], SlotKind::Displacement | SlotKind::Rotation);
-    for slot in (0..model.slots()).filter(moves).filter(|&slot| !is_massive[slot]) {
-        let numbers = system.pattern.dof_map.of(slot as Slot);
-        let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != DofMap::HELD).collect();
-        let (block, weight) = with_mass_where_held(system, slot as Slot);
-        let mut addition = Mat3::ZERO;
-        let symmetric = Matrix3::from_fn(|i, j| 0.5 * (block.0[i][j] + block.0[j][i]));
-        let eigen = SymmetricEigen::new(symmetric);
-        for k in 0..3 {
-            let v = eigen.eigenvectors.column(k);
-            if eigen.eigenvalues[k].abs() > 1e-12 * weight {
-                continue;
-            }
-            let along: f64 = free.iter().map(|&i| v[i] * right_hand_side[numbers[i] as usize]).sum();
-            free.iter().for_each(|&i| right_hand_side[numbers[i] as usize] -= along * v[i]);
-            let direction = Vec3([v[0], v[1], v[2]]);
-            addition += direction.outer(direction).scale(weight);
-        }
-        additions.push((slot as Slot, addition));
-    }
-    additions
-}
-
-/// The diagonal block of a mass matrix at a slot, and its largest entry. A held direction is given
-/// as much, so that it does not count as massless.
-fn with_mass_where_held(system: &System, slot: Slot) -> (Mat3, f64) {
-    let (mut block, numbers) = (system.own_block(slot), system.pattern.dof_map.of(slot));
-    let weight = if block.max_abs() > 0.0 { block.max_abs() } else { 1.0 };
-    for k in (0..3).filter(|&k| numbers[k] == DofMap::HELD) {
-        block.0[k][k] += weight;
-    }
-    (block, weight)
-}
-
-/// True if a matrix has no eigenvalue that is next to nothing beside its entries: none is larger
-/// than three times the largest of these.
-fn is_regular(matrix: &Mat3) -> bool {
-    let [a, b, c] = matrix.0.map(Vec3);
-    a.dot(b.cross(c)).abs() > 1e-9 * matrix.max_abs().powi(3)
 }
 
 impl Dynamics<'_, '_> {
@@ -388,29 +341,5 @@ impl Dynamics<'_, '_> {
         let rateless = |&slot: &usize| !(massive[slot] || damped[slot] || model.kinds[slot].is_multiplier());
         self.rateless = (0..massive.len()).filter(rateless).collect();
         self.massive = massive;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::rotation::Rotation;
-
-    #[test]
-    fn what_is_regular_has_no_eigenvalue_next_to_nothing() {
-        let turn = Rotation::new(Vec3([0.3, -1.1, 0.7])).r;
-        let with = |eigenvalues: [f64; 3]| turn * Mat3::diagonal(eigenvalues) * turn.transpose() * 1e5;
-        let smallest = |matrix: &Mat3| {
-            let eigen = SymmetricEigen::new(Matrix3::from_fn(|i, j| matrix.0[i][j])).eigenvalues;
-            eigen.iter().fold(f64::INFINITY, |m: f64, e| m.min(e.abs())) / matrix.max_abs()
-        };
-        for (third, regular) in [(1.0, true), (1e-3, true), (1e-8, true), (1e-11, false), (1e-13, false), (0.0, false)]
-        {
-            let matrix = with([2.0, 1.0, third]);
-            assert_eq!(is_regular(&matrix), regular, "{third}");
-            assert!(!is_regular(&matrix) || smallest(&matrix) > 1e-12, "{third}");
-        }
-        let none = [Mat3::ZERO, with([f64::NAN, 1.0, 1.0]), Mat3::ZERO * f64::NAN];
-        assert!(!none.iter().any(is_regular));
     }
 }
