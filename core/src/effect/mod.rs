@@ -242,9 +242,10 @@ pub trait ForceJumps {
     /// What has jumped within a time step of some length.
     fn jumped(&self, from: &State, to: &State, length: f64) -> Option<ForceJump>;
 
-    /// Shows by slot what the mean of the forces at both ends of a time step of some length misses
+    /// Shows by slot what a mean of the forces at some instants of a time step of some length misses
     /// where a force has jumped: the mean force over the step less that mean (internal, spatial).
-    fn missed(&self, from: &State, to: &State, length: f64, show: &mut dyn FnMut(Slot, Vec3));
+    /// `instants` are the states there, equally far from each other, with their weights.
+    fn missed(&self, instants: &[(f64, &State)], length: f64, show: &mut dyn FnMut(Slot, Vec3));
 }
 
 /// The role of constraints: gaps that multipliers close, and motors that prescribe them.

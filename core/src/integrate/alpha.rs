@@ -54,7 +54,8 @@ pub enum Rotations {
 pub enum Stages {
     /// The end
     End,
-    /// The middle and the end, see [`super::Lobatto`], which uses none of the coefficients
+    /// The middle and the end, see [`super::Lobatto`]. The coefficients are those of the trapezoidal
+    /// rule, by which the estimated error of such steps goes on.
     MiddleAndEnd,
 }
 
@@ -170,6 +171,23 @@ impl Step {
                 }
             }
         });
+    }
+
+    /// The factors of the local errors tau of places and tau' of rates, see
+    /// [`super::carried_error`]: of the slope of [`super::StepEnds::rate_of_error`] in tau and in
+    /// tau', and of the change of that slope over the step in tau'.
+    pub(super) fn error_factors(&self) -> [f64; 3] {
+        let Scheme { beta, gamma, alpha_m, stages, .. } = self.scheme;
+        let lag = self.scheme.lag();
+        let h = self.length;
+        match stages {
+            Stages::End => [
+                (1.0 / 6.0 - beta - 0.5 * lag) * h * h * h,
+                (0.5 - gamma - lag) * h * h,
+                (1.0 / 6.0 - lag * (alpha_m - 0.5) - gamma * (0.5 + lag)) * h * h,
+            ],
+            Stages::MiddleAndEnd => [h.powi(5) / 720.0, 0.0, -0.25 / 720.0 * h.powi(4)],
+        }
     }
 
     /// The coefficients of a rotation over the step.

@@ -21,12 +21,26 @@
 //! tau' = (1/2 - gamma - d) h^2 q''' + [1/6 - d (alpha_m - 1/2) - gamma (1/2 + d)] h^3 q''''
 //! ```
 //!
-//! The derivatives are slopes of accelerations over several steps. The error of a motion that steps
+//! The derivatives are slopes of accelerations over several steps.
+//!
+//! The error of steps with a stage in their middle (Lobatto IIIA) is carried by the trapezoidal rule,
+//! with a tangent of its own. Where the acceleration is f(q, v), with the slopes f_q and f_v, and c =
+//! h^4/720, the defect of the collocation leaves
+//!
+//! ```text
+//! tau = h c q^(5)        tau' = h c [5/4 (f_q q^(4) + f_v q^(5)) - 1/4 q^(6)]
+//! ```
+//!
+//! which is h c q^(6) in a linear system. For the first part of tau', stiffness and damping act on e +
+//! 5/4 c q^(4) and its rate in the place of e. The derivatives come from second differences of
+//! accelerations within steps, and from their changes from step to step.
+//!
+//! The error of a motion that steps
 //! do not resolve is bounded by the size of the motion, which a linear equation does not know;
 //! slopes over several steps do not see it.
 
 use super::time_error::{Correct, Largest, Scene, StepEnds, is_to_switch};
-use super::{Increments, Method, Scheme, Step};
+use super::{Increments, Method, Scheme, Stages, Step};
 use crate::kernel::Weights;
 use crate::kernel::turn::{StartChange, Stretch, Turn};
 use crate::model::{Assembly, SlotKind};
@@ -121,16 +135,19 @@ struct SlotError {
     rate2: Vec3,
     /// E at the end of the last step
     algorithmic: Vec3,
-    /// Accelerations at the ends of the last steps, each at the index of its number modulo
-    /// [`SLOPE_STEPS`]
+    /// [`StepEnds::rate_of_error`] at the ends of the last steps, each at the index of its number
+    /// modulo [`SLOPE_STEPS`]
     past: [Vec3; SLOPE_STEPS],
-    /// The last slope of accelerations, q'''
-    jerk: Vec3,
+    /// The last slope of that rate
+    slope: Vec3,
     /// q at the start of the stage
     start: Vec3,
     /// True if accelerations of the slot are determined by mass
     moves: bool,
-    /// The number of steps whose accelerations are known, up to [`SLOPE_STEPS`]
+    /// The part of an error, and of its rate, on which stiffness and damping act in the next step as
+    /// if it were there; zero without a stage in the middle
+    apparent: [Vec3; 2],
+    /// The number of steps whose rates of errors are known, up to [`SLOPE_STEPS`]
     age: u8,
 }
 
@@ -152,8 +169,8 @@ impl SlotError {
         let old = stretch.of_smooth(own, self.rate2);
         let new = (self.rate2 * alpha_f - old * alpha_m) * (1.0 / (1.0 - alpha_m));
         Predicted {
-            error: self.error + self.rate * h + (old * (0.5 - beta) + new * beta) * (h * h),
-            rate: self.rate + (old * (1.0 - gamma) + new * gamma) * h,
+            error: self.error + self.apparent[0] + self.rate * h + (old * (0.5 - beta) + new * beta) * (h * h),
+            rate: self.rate + self.apparent[1] + (old * (1.0 - gamma) + new * gamma) * h,
             algorithmic: new,
         }
     }
@@ -211,6 +228,11 @@ impl CarriedError {
     /// True if the error is not zero.
     pub fn has_error(&self) -> bool {
         self.scaling > 0.0
+    }
+
+    /// The weights of the tangent that carries the error.
+    pub fn weights(&self) -> Weights {
+        self.step.weights()
     }
 
     /// True if [`Self::look`] has not been called in the present step.
@@ -347,14 +369,14 @@ impl CarriedError {
     /// Ends a step between two states in one chart, with the `error` that [`Self::solve`] has
     /// found, and adds the local errors.
     pub fn end(&mut self, dof_map: &DofMap, error: &[Vec3], step_ends: StepEnds, increments: Option<&Increments>) {
-        let StepEnds { from, to } = step_ends;
+        let to = step_ends.to;
         let Step { scheme, length: h } = self.step;
         let stretch = self.stretch();
         let weights = self.step.weights();
         self.steps += 1;
         let own = self.steps % SLOPE_STEPS;
         self.lengths[own] = h;
-        let local = LocalErrors::new(&scheme, h, own, self.lengths.iter().sum());
+        let local = LocalErrors::new(&self.step, own, self.lengths.iter().sum());
         // Without a solution the error is kept: a free continuation would exaggerate errors of
         // stiff motions.
         let found = self.known == Known::Error;
@@ -370,20 +392,22 @@ impl CarriedError {
                 if found && slot.moves {
                     let predicted = slot.predicted(step, stretch);
                     let x = error[k] - predicted.error;
-                    slot.rate = predicted.rate + x * weights.damping;
+                    slot.error = error[k] - slot.apparent[0];
+                    slot.rate = predicted.rate + x * weights.damping - slot.apparent[1];
                     slot.rate2 = x * weights.mass;
                     slot.algorithmic = predicted.algorithmic + x * (1.0 / (scheme.beta * h * h));
-                }
-                if found {
+                } else if found {
                     slot.error = error[k];
                 }
                 let mut now = slot.error;
                 if slot.moves {
-                    let rings = local.rings(slot, from.a[k], to.a[k]);
-                    let [mut of_place, mut of_rate] = local.of(slot, from.a[k], to.a[k]);
+                    let ends = local.rates(slot, &step_ends, k);
+                    let rings = local.rings(slot, ends);
+                    let [mut of_place, mut of_rate] = local.of(slot, ends);
                     if !dof_map.is_plain(k as Slot) {
-                        of_place -= dof_map.held_part(k as Slot, of_place);
-                        of_rate -= dof_map.held_part(k as Slot, of_rate);
+                        for error in [&mut of_place, &mut of_rate].into_iter().chain(&mut slot.apparent) {
+                            *error -= dof_map.held_part(k as Slot, *error);
+                        }
                     }
                     // The error of a rate has no effect on places before the end of the next step.
                     now += of_place;
@@ -422,7 +446,7 @@ impl CarriedError {
     fn end_turns(
         &mut self,
         increments: &Increments,
-        StepEnds { from, to }: StepEnds,
+        StepEnds { from, to, .. }: StepEnds,
         local: &LocalErrors,
         largest: &mut Largest,
         sizes: &mut [Largest; 2],
@@ -436,8 +460,9 @@ impl CarriedError {
         for (before, after) in increments.accelerations(from).zip(increments.accelerations(to)) {
             let slot = &mut self.slots[after.slot as usize];
             if slot.moves {
-                let rings = local.rings(slot, before.driven, after.driven);
-                let [of_place, of_rate] = local.of(slot, before.driven, after.driven);
+                let ends = [before.driven, after.driven];
+                let rings = local.rings(slot, ends);
+                let [of_place, of_rate] = local.of(slot, ends);
                 let of_spin = (after.free - before.free) * (h.powi(4) * after.spin.squared() * FREE_SPIN_ERROR);
                 let back = Rotation::new(to.q[after.slot as usize]).r.transpose();
                 take_size(sizes, SlotKind::Rotation, of_place + of_spin, rings);
@@ -464,6 +489,7 @@ impl CarriedError {
             slot.algorithmic = b * slot.algorithmic + drift;
             slot.rate = b * slot.rate + b_rate * slot.error;
             slot.error = b * slot.error;
+            slot.apparent = [Vec3::ZERO; 2];
             slot.age = 0;
         }
     }
@@ -491,10 +517,13 @@ impl CarriedError {
 }
 
 /// True if local errors of places bound those of rates: not in a scheme of first order, nor with a
-/// beta near 1/6.
+/// beta near 1/6, nor with a stage in the middle of steps.
 fn places_bound_rates(scheme: &Scheme) -> bool {
     let lag = scheme.lag();
-    (0.5 - scheme.gamma - lag).abs() < 1e-9 && (1.0 / 6.0 - scheme.beta - 0.5 * lag).abs() > 0.04
+    match scheme.stages {
+        Stages::End => (0.5 - scheme.gamma - lag).abs() < 1e-9 && (1.0 / 6.0 - scheme.beta - 0.5 * lag).abs() > 0.04,
+        Stages::MiddleAndEnd => false,
+    }
 }
 
 /// Updates the largest local errors of a step, all and those of ringing accelerations, with one of
@@ -514,44 +543,80 @@ fn turns(state: &State) -> impl Iterator<Item = (usize, &Turn)> {
 
 /// The coefficients of the local errors of a step.
 struct LocalErrors {
-    /// The factors of q''' in tau and in tau', and of the change of q''' in tau'
+    /// See [`Step::error_factors`]
     factors: [f64; 3],
+    /// The factor of the rate of the error in [`SlotError::apparent`]
+    of_apparent: f64,
+    /// The length of the step
+    length: f64,
+    /// The number of steps over which slopes are taken
+    steps: usize,
+    /// The number of steps whose slopes change by their own completion, not with the motion
+    settling: usize,
     /// The index of the step in lists of the last steps
     place: usize,
-    /// One over the sum of the lengths of the last steps, 1/time
+    /// One over the sum of the lengths of the steps of a slope, 1/time
     per_span: f64,
 }
 
 impl LocalErrors {
-    fn new(scheme: &Scheme, h: f64, place: usize, span: f64) -> Self {
-        let Scheme { beta, gamma, alpha_m, .. } = *scheme;
-        let lag = scheme.lag();
-        let of_change = 1.0 / 6.0 - lag * (alpha_m - 0.5) - gamma * (0.5 + lag);
-        let of_slope = [1.0 / 6.0 - beta - 0.5 * lag, 0.5 - gamma - lag];
-        Self { factors: [of_slope[0] * h * h * h, of_slope[1] * h * h, of_change * h * h], place, per_span: 1.0 / span }
+    /// Of a step whose index in lists of the last steps is `place`, and with which the last
+    /// [`SLOPE_STEPS`] have taken the time `span`.
+    fn new(step: &Step, place: usize, span: f64) -> Self {
+        let factors = step.error_factors();
+        let length = step.length;
+        match step.scheme.stages {
+            Stages::End => {
+                let [steps, settling] = [SLOPE_STEPS; 2];
+                Self { factors, of_apparent: 0.0, length, steps, settling, place, per_span: 1.0 / span }
+            }
+            // Such steps are long: slopes over several would miss much of the motion.
+            Stages::MiddleAndEnd => {
+                let of_apparent = 1.25 / 720.0 * length.powi(4);
+                Self { factors, of_apparent, length, steps: 1, settling: 2, place, per_span: 1.0 / length }
+            }
+        }
     }
 
-    /// True if the change of an acceleration reverses from step to step.
+    /// The index of an earlier step in lists of the last steps.
+    fn earlier(&self, steps: usize) -> usize {
+        (self.place + SLOPE_STEPS - steps) % SLOPE_STEPS
+    }
+
+    /// The rates of the error of a slot at both ends of the step. A second difference belongs to a
+    /// whole step: that before the first one is taken to be the same.
     #[inline(always)]
-    fn rings(&self, slot: &SlotError, before: Vec3, after: Vec3) -> bool {
-        let earlier = slot.past[(self.place + SLOPE_STEPS - 2) % SLOPE_STEPS];
+    fn rates(&self, slot: &SlotError, step_ends: &StepEnds, k: usize) -> [Vec3; 2] {
+        let after = step_ends.rate_of_error(k);
+        let before = match step_ends.middle {
+            None => step_ends.from.a[k],
+            Some(_) if slot.age == 0 => after,
+            Some(_) => slot.past[self.earlier(1)],
+        };
+        [before, after]
+    }
+
+    /// True if the change of the rate of an error reverses from step to step.
+    #[inline(always)]
+    fn rings(&self, slot: &SlotError, [before, after]: [Vec3; 2]) -> bool {
+        let earlier = slot.past[self.earlier(2)];
         slot.age > 1 && (after - before).dot(before - earlier) < 0.0
     }
 
-    /// The local errors tau and tau', from the accelerations at both ends of the step.
+    /// The local errors tau and tau', from the rates of the error at both ends of the step.
     #[inline(always)]
-    fn of(&self, slot: &mut SlotError, before: Vec3, after: Vec3) -> [Vec3; 2] {
+    fn of(&self, slot: &mut SlotError, [before, after]: [Vec3; 2]) -> [Vec3; 2] {
         if slot.age == 0 {
-            // Accelerations before the first step are taken to be those at its start.
+            // Rates before the first step are taken to be those at its start.
             slot.past = [before; SLOPE_STEPS];
         }
-        let jerk = (after - slot.past[self.place]) * self.per_span;
-        // A slope over fewer steps changes by its own completion, not with the motion.
-        let change = if usize::from(slot.age) < SLOPE_STEPS { Vec3::ZERO } else { jerk - slot.jerk };
+        let slope = (after - slot.past[self.earlier(self.steps)]) * self.per_span;
+        let change = if usize::from(slot.age) < self.settling { Vec3::ZERO } else { slope - slot.slope };
         slot.age = (SLOPE_STEPS as u8).min(slot.age + 1);
         slot.past[self.place] = after;
-        slot.jerk = jerk;
+        slot.slope = slope;
+        slot.apparent = [after + slope * self.length, slope].map(|rate| rate * self.of_apparent);
         let [of_place, of_rate, of_change] = self.factors;
-        [jerk * of_place, jerk * of_rate + change * of_change]
+        [slope * of_place, slope * of_rate + change * of_change]
     }
 }

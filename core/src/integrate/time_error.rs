@@ -3,12 +3,13 @@
 //! The local error of a step is tau = (1/6 - beta - d/2) h^3 q''', with d = alpha_m - alpha_f. The
 //! sum of the sizes of local errors is |1/6 - beta - d/2| h^2 times the total variation of
 //! accelerations, which is 2/pi of the error of an oscillation, whose phase errors add up over
-//! quarter periods. While that sum stays far below the size of a warning nothing else is done;
+//! quarter periods. With a stage in the middle of steps it is tau = h^5/720 q''''', from the second
+//! differences of accelerations within steps. While that sum stays far below the size of a warning nothing else is done;
 //! where it will not, and in small scenes, where errors may grow by themselves, the error is
 //! integrated beside the motion (`carried_error`).
 
 use super::carried_error::{CarriedError, FREE_SPIN_ERROR, SLOPE_STEPS};
-use super::{Increments, Scheme, Step};
+use super::{Increments, Stages, Step};
 use crate::kernel::Weights;
 use crate::model::charts::DYNAMIC_BAND;
 use crate::model::{Assembly, Model, SlotKind};
@@ -39,6 +40,9 @@ const MIN_STEPS: usize = 4 * SLOPE_STEPS;
 
 /// The share of the stage before sums of local errors are extrapolated to its end.
 const MIN_STAGE_SHARE: f64 = 0.125;
+
+/// A rate that is not known: changes from it count as none.
+const UNKNOWN: Vec3 = Vec3([f64::NAN; 3]);
 
 /// The largest errors of a stage, and the largest displacement to compare them with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -100,13 +104,40 @@ impl Scene {
     }
 }
 
-/// The states at both ends of a time step, in one chart.
+/// The states at both ends of a time step, and in its middle if that is a stage, in one chart.
 #[derive(Clone, Copy)]
 pub struct StepEnds<'a> {
     /// The state at the start of the step
     pub(crate) from: &'a State,
+    /// The state in the middle of the step, if that is a stage
+    pub(crate) middle: Option<&'a State>,
     /// The state at the end of the step
     pub(crate) to: &'a State,
+}
+
+impl StepEnds<'_> {
+    /// The rate of a slot at the end of the step whose slope the local error is a multiple of: the
+    /// acceleration; with a middle q'''', from the parabola through the accelerations.
+    #[inline(always)]
+    pub(super) fn rate_of_error(&self, slot: usize) -> Vec3 {
+        let Self { from, middle, to } = self;
+        match middle {
+            None => to.a[slot],
+            Some(middle) => {
+                let half = 0.5 * (to.time - from.time);
+                (from.a[slot] - middle.a[slot] * 2.0 + to.a[slot]) * (1.0 / (half * half))
+            }
+        }
+    }
+
+    /// The states of the step, each with the weight of its force in the impulse that the step takes.
+    fn instants(&self) -> Vec<(f64, &State)> {
+        let Self { from, middle, to } = *self;
+        match middle {
+            None => vec![(0.5, from), (0.5, to)],
+            Some(middle) => vec![(1.0 / 6.0, from), (2.0 / 3.0, middle), (1.0 / 6.0, to)],
+        }
+    }
 }
 
 /// The error of the steps of a stage.
@@ -115,7 +146,8 @@ pub struct TimeError {
     scene: Scene,
     /// q at the start of the stage
     start: Vec<Vec3>,
-    /// Accelerations at the last update of the sum; NaN where they are those of another chart
+    /// [`StepEnds::rate_of_error`] at the last update of the sum; NaN where it is that of another
+    /// chart, or not known yet
     past: Field,
     /// Accelerations, by moments and by the spin itself (spatial), of rotations whose unknowns are
     /// increments, at the last update of the sum
@@ -155,10 +187,15 @@ impl TimeError {
         duration: f64,
     ) -> Self {
         let scene = Scene { kinds: model.kinds.clone(), length: model.length, massive: massive.to_vec() };
+        let mut past = state.a.clone();
+        match first.scheme.stages {
+            Stages::End => (),
+            Stages::MiddleAndEnd => past.fill(UNKNOWN),
+        }
         let mut error = Self {
             scene,
             start: state.q.clone(),
-            past: state.a.clone(),
+            past,
             past_turns: increments
                 .into_iter()
                 .flat_map(|increments| increments.accelerations(state))
@@ -196,6 +233,11 @@ impl TimeError {
         self.carried.as_ref().is_some_and(|carried| carried.has_error())
     }
 
+    /// The weights of the tangent that carries the error, where there is one.
+    pub fn weights(&self) -> Option<Weights> {
+        self.carried.as_ref().filter(|carried| carried.has_error()).map(|carried| carried.weights())
+    }
+
     /// True if an error is carried and [`Self::look`] has not been called in the present step.
     pub fn knows_no_forces(&self) -> bool {
         self.carried.as_ref().is_some_and(|carried| carried.knows_no_forces())
@@ -229,27 +271,27 @@ impl TimeError {
     ) {
         if let Some(carried) = &mut self.carried {
             if self.sees_jumps {
-                carried.miss(model.missed(step_ends.from, step_ends.to, step.length));
+                carried.miss(model.missed(&step_ends.instants(), step.length));
             }
             return carried.end(&system.pattern.dof_map, error, step_ends, increments);
         }
         self.steps += 1;
         self.longest = self.longest.filter(|longest| longest.length >= step.length).or(Some(*step));
         if self.steps.is_multiple_of(SLOPE_STEPS) {
-            self.sum_up(&system.pattern.dof_map, step_ends.to, increments);
+            self.sum_up(&system.pattern.dof_map, step_ends, increments);
             if self.is_worth_carrying() {
                 self.carry(system, step_ends.to, *step);
             }
         }
     }
 
-    /// Adds the local errors of the steps since the last update of the sum, up to this state.
-    /// Called every few steps, and at the end of the stage.
-    pub fn sum_up(&mut self, dof_map: &DofMap, state: &State, increments: Option<&Increments>) {
+    /// Adds the local errors of the steps since the last update of the sum, up to the end of this
+    /// one. Called every few steps, and at the end of the stage.
+    pub fn sum_up(&mut self, dof_map: &DofMap, step_ends: StepEnds, increments: Option<&Increments>) {
         let Some(step) = self.longest.take() else { return };
-        let Scheme { beta, .. } = step.scheme;
+        let state = step_ends.to;
         let h2 = step.length * step.length;
-        let factor = (1.0 / 6.0 - beta - 0.5 * step.scheme.lag()).abs() * h2;
+        let factor = step.error_factors()[0].abs() / step.length;
         let Self { scene, start, past, .. } = self;
         let scene = &*scene;
         let start = &start[..];
@@ -260,7 +302,8 @@ impl TimeError {
                 if !scene.moves(k) || (kind == SlotKind::Rotation && increments.is_some()) {
                     continue;
                 }
-                let mut change = state.a[k] - std::mem::replace(past, state.a[k]);
+                let rate = step_ends.rate_of_error(k);
+                let mut change = rate - std::mem::replace(past, rate);
                 if !dof_map.is_plain(k as Slot) {
                     change -= dof_map.held_part(k as Slot, change);
                 }
@@ -302,7 +345,7 @@ impl TimeError {
             Some(carried) => carried.change_charts(state, rotations),
             None => {
                 let switches = |slot: &&Slot| is_to_switch(state.q[**slot as usize]);
-                rotations.iter().filter(switches).for_each(|&slot| self.past[slot as usize] = Vec3([f64::NAN; 3]));
+                rotations.iter().filter(switches).for_each(|&slot| self.past[slot as usize] = UNKNOWN);
             }
         }
     }

@@ -245,10 +245,10 @@ impl Model {
 
     /// What the means of forces at both ends of a step of some length miss where forces jump, by
     /// slot; see [`ForceJumps::missed`].
-    pub fn missed(&self, from: &State, to: &State, length: f64) -> Vec<(Slot, Vec3)> {
+    pub fn missed(&self, instants: &[(f64, &State)], length: f64) -> Vec<(Slot, Vec3)> {
         let mut missed = Vec::new();
         self.force_jumps()
-            .for_each(|effect| effect.missed(from, to, length, &mut |slot, force| missed.push((slot, force))));
+            .for_each(|effect| effect.missed(instants, length, &mut |slot, force| missed.push((slot, force))));
         missed
     }
 

@@ -11,7 +11,8 @@ use crate::effect::RoundOff;
 use crate::integrate::{Lobatto, Stage};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model};
-use crate::system::State;
+use crate::system::{State, System};
+use crate::tensor::Vec3;
 
 /// The residual of the middle stage before its last correction, over its tolerance, that this
 /// correction and one of the end bring below it.
@@ -84,6 +85,7 @@ impl Stages<'_> {
             last = Some(self.correct(Stage::End, round, forms, residual)?);
             if is_balanced {
                 self.newton.solver.succeeded();
+                self.carry_error();
                 return Ok(());
             }
             let Judgement { verdict, residual } = self.evaluate(Stage::Middle, false, last_of_middle)?;
@@ -95,6 +97,27 @@ impl Stages<'_> {
         }
         let Judgement { residual, .. } = self.evaluate(Stage::End, false, last)?;
         Err(self.not_converged(residual))
+    }
+
+    /// Solves for a carried error of the steps at the end, with a tangent of its own.
+    fn carry_error(&mut self) {
+        let Self { newton, assembly, end, work, .. } = self;
+        let Newton { time_error, solver, dq, .. } = &mut **newton;
+        let Some((error, weights)) = time_error.as_mut().and_then(|error| error.weights().map(|w| (error, w))) else {
+            return;
+        };
+        let Work { evaluation_seconds, solve_seconds, factorisations, .. } = &mut **work;
+        timed(evaluation_seconds, || {
+            assembly.evaluate(end, weights, None);
+            error.look(assembly, end, weights);
+        });
+        timed(solve_seconds, || {
+            let Factorisation { is_done, is_new } =
+                solver.factorise_new(&mut Tangent::that_may_go(assembly, end, weights));
+            *factorisations += u64::from(is_new);
+            let mut correct = |system: &System, dq: &mut [Vec3]| is_done && solver.correct(system, false, None, dq);
+            error.solve(&mut correct, &mut assembly.system, end, dq);
+        });
     }
 
     /// True if the last round has left much of the residual.

@@ -120,16 +120,19 @@ impl Link {
         self.tension_only && [0.5, 1.0].into_iter().any(|part| is_slack(part) != is_slack(0.0))
     }
 
-    /// What the mean of the forces at both ends misses, see [`ForceJumps::missed`]; `None` where the
-    /// cable is slack all the time, or taut.
-    fn missed(&self, from: &State, to: &State, length: f64) -> Option<Vec3> {
-        if !self.changes(from, to, length) {
+    /// What a mean of the forces at some instants misses, see [`ForceJumps::missed`]; `None` where
+    /// the cable is slack all the time, or taut.
+    fn missed(&self, instants: &[(f64, &State)], length: f64) -> Option<Vec3> {
+        let pieces = || instants.windows(2).map(|piece| [piece[0].1, piece[1].1]);
+        let length = length / pieces().count() as f64;
+        if !pieces().any(|[from, to]| self.changes(from, to, length)) {
             return None;
         }
-        let at = |part: f64| self.within([from, to], length, part);
         let part = |k: usize| (k as f64 + 0.5) / PARTS as f64;
-        let sum = (0..PARTS).fold(Vec3::ZERO, |sum, k| sum + self.force(at(part(k))));
-        Some(sum * (1.0 / PARTS as f64) - (self.force(at(0.0)) + self.force(at(1.0))) * 0.5)
+        let along = |ends| (0..PARTS).fold(Vec3::ZERO, |sum, k| sum + self.force(self.within(ends, length, part(k))));
+        let sum = pieces().fold(Vec3::ZERO, |sum, ends| sum + along(ends));
+        let seen = |mean: Vec3, &(weight, at): &(f64, &State)| mean + self.force(self.between(at).into()) * weight;
+        Some(sum * (1.0 / (PARTS * pieces().count()) as f64) - instants.iter().fold(Vec3::ZERO, seen))
     }
 
     fn between(&self, at: &State) -> (Vec3, Vec3) {
@@ -228,9 +231,10 @@ impl ForceJumps for Links {
         changed.map(|link| if link.damping == 0.0 { ForceJump::Slope } else { ForceJump::Force }).max()
     }
 
-    fn missed(&self, from: &State, to: &State, length: f64, show: &mut dyn FnMut(Slot, Vec3)) {
-        for link in self.acting(to) {
-            if let Some(missed) = link.missed(from, to, length) {
+    fn missed(&self, instants: &[(f64, &State)], length: f64, show: &mut dyn FnMut(Slot, Vec3)) {
+        let Some((_, end)) = instants.last() else { return };
+        for link in self.acting(end) {
+            if let Some(missed) = link.missed(instants, length) {
                 let [a, b] = link.nodes.map(|node| node.u);
                 show(a, -missed);
                 show(b, missed);

@@ -3,7 +3,6 @@
 use crate::integrate::{Increments, Scheme, Stages, StepEnds};
 use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
-use crate::system::State;
 use serde::{Deserialize, Serialize};
 
 /// Chooses the length of steps.
@@ -89,16 +88,9 @@ impl Control {
     }
 
     /// The largest local error of a step and its slot, from the accelerations at its ends, and in
-    /// its middle if that is a stage; all states in one chart.
-    pub fn error(
-        &self,
-        model: &Model,
-        increments: Option<&Increments>,
-        ends: StepEnds,
-        middle: Option<&State>,
-        length: f64,
-    ) -> (f64, usize) {
-        let StepEnds { from: start, to: end } = ends;
+    /// its middle if that is a stage.
+    pub fn error(&self, model: &Model, increments: Option<&Increments>, ends: StepEnds, length: f64) -> (f64, usize) {
+        let StepEnds { from: start, middle, to: end } = ends;
         // Without a factor the difference is no estimate; that of the trapezoidal rule keeps steps
         // sensible.
         let factor = match self.scheme.stages {

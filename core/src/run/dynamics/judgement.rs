@@ -3,9 +3,10 @@
 
 use super::Dynamics;
 use crate::effect::TOLD_PENETRATION;
-use crate::integrate::{Largest, Rotations};
+use crate::integrate::{Largest, Rotations, Stages, StepEnds};
 use crate::run::energy::Imbalance;
 use crate::run::findings::StageTimeError;
+use crate::run::plan::TimeStepping;
 use crate::run::stage_run::StageRun;
 use crate::system::StageKind;
 use crate::warning::WarningKind;
@@ -119,9 +120,11 @@ impl Dynamics<'_, '_> {
 
     /// Notes the estimated errors of fixed steps, and warns of steps that are too long.
     pub(super) fn judge_steps(&mut self) {
-        let StageRun { assembly, newton, state, counters, issued, number, .. } = &mut *self.stage;
+        let StageRun { assembly, newton, good, state, counters, issued, number, .. } = &mut *self.stage;
         let Some(error) = &mut newton.time_error else { return };
-        error.sum_up(&assembly.system.pattern.dof_map, state, self.increments.as_ref());
+        let middle = self.middle.as_ref().map(|middle| &middle.state);
+        let ends = StepEnds { from: good, middle, to: state };
+        error.sum_up(&assembly.system.pattern.dof_map, ends, self.increments.as_ref());
         let largest = error.largest();
         counters.findings.time_errors.push(StageTimeError { stage: *number + 1, largest });
         // What is left of a motion that has died away may err by its own size.
@@ -139,8 +142,14 @@ impl Dynamics<'_, '_> {
     /// Steps or a scheme that err less.
     fn advice(&self, excess: &Excess) -> String {
         // Beyond its own size an error that grows linearly tells no more.
-        let shorter = round_down(self.settings.step * (PROPOSED_ERROR / excess.over.min(1.0 / TOLD_ERROR)).sqrt());
-        let other_scheme_helps = excess.of_rotations && self.settings.scheme.rotations == Rotations::Totals;
+        let TimeStepping { step, scheme, .. } = self.settings;
+        let root = match scheme.stages {
+            Stages::End => 0.5,
+            Stages::MiddleAndEnd => 0.25,
+        };
+        let shorter = round_down(step * libm::pow(PROPOSED_ERROR / excess.over.min(1.0 / TOLD_ERROR), root));
+        let other_scheme_helps =
+            excess.of_rotations && scheme.rotations == Rotations::Totals && scheme.stages == Stages::End;
         if !other_scheme_helps {
             format!("`step = {shorter}`")
         } else if (PROPOSED_ERROR / excess.over).sqrt() < LEAST_PART_OF_STEP {

@@ -176,11 +176,8 @@ impl Dynamics<'_, '_> {
         Step { scheme: self.settings.scheme, length: self.settings.step }
     }
 
-    /// The errors of fixed steps are estimated from here on, where they are of second order.
+    /// The errors of fixed steps are estimated from here on.
     fn follow_errors(&mut self) {
-        if self.middle.is_some() {
-            return;
-        }
         let first = self.first_step();
         let StageRun { assembly, newton, state, model, .. } = &mut *self.stage;
         let increments = self.increments.as_ref();
@@ -273,9 +270,8 @@ impl Dynamics<'_, '_> {
             let taken = match tried {
                 Ok(()) => {
                     let increments = self.increments.as_ref();
-                    let middle = self.middle.as_ref().map(|middle| &middle.state);
-                    let ends = StepEnds { from: self.stage.good, to: self.stage.state };
-                    let (error, slot) = control.error(self.stage.model, increments, ends, middle, length);
+                    let ends = self.step_ends();
+                    let (error, slot) = control.error(self.stage.model, increments, ends, length);
                     let taken = control.judge(length, error);
                     if !taken && at_floor {
                         let failure = NewtonFailure::StepTooSmall { slot, error, share: control.share(length) };
@@ -338,7 +334,7 @@ impl Dynamics<'_, '_> {
         match self.middle.take() {
             None => self.find_end(step, next)?,
             Some(mut middle) => {
-                let found = self.find_stages(&mut middle, step.length, next);
+                let found = self.find_stages(&mut middle, &step, next);
                 self.middle = Some(middle);
                 found?;
             }
@@ -354,9 +350,16 @@ impl Dynamics<'_, '_> {
             self.stage.refuse_missed_within(&middle.state)?;
         }
         let StageRun { assembly, newton, state, good, model, .. } = &mut *self.stage;
-        let ends = StepEnds { from: good, to: state };
+        let middle = self.middle.as_ref().map(|middle| &middle.state);
+        let ends = StepEnds { from: good, middle, to: state };
         newton.end_step(model, &assembly.system, ends, &step, self.increments.as_ref());
         Ok(())
+    }
+
+    /// The states of the last step.
+    fn step_ends(&self) -> StepEnds<'_> {
+        let middle = self.middle.as_ref().map(|middle| &middle.state);
+        StepEnds { from: self.stage.good, middle, to: self.stage.state }
     }
 
     /// Finds the balance at the end of a step.

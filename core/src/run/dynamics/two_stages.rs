@@ -2,7 +2,7 @@
 
 use super::Dynamics;
 use super::middle::Middle;
-use crate::integrate::{Lobatto, MIDDLE, Stage};
+use crate::integrate::{Lobatto, MIDDLE, Stage, Step};
 use crate::model::Assembly;
 use crate::run::energy::Entry;
 use crate::run::failure::Failure;
@@ -13,9 +13,13 @@ use crate::system::State;
 impl Dynamics<'_, '_> {
     /// Predicts both stages of a step, puts prescribed directions where they belong, and finds the
     /// balance of both.
-    pub(super) fn find_stages(&mut self, middle: &mut Middle, length: f64, next: f64) -> Result<(), NewtonFailure> {
+    pub(super) fn find_stages(&mut self, middle: &mut Middle, step: &Step, next: f64) -> Result<(), NewtonFailure> {
         let StageRun { assembly, newton, state, model, schedule, counters, bookkeeper, keeps_account, .. } =
             &mut *self.stage;
+        if let Some(error) = &mut newton.time_error {
+            error.begin(step, self.last_length);
+        }
+        let length = step.length;
         let step = Lobatto { length };
         let Middle { state: middle, predictor } = middle;
         if !self.rateless.is_empty() {
