@@ -46,6 +46,7 @@ mod rest;
 mod restart;
 mod resultants;
 mod resume;
+mod reversals;
 mod rotations;
 mod scenes;
 mod schemes;

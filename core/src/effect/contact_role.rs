@@ -1,5 +1,6 @@
 //! The role of contacts beside their forces.
 
+use crate::kernel::contact::{FrictionLaw, PointState, Status};
 use crate::system::{Slot, State};
 use crate::tensor::Vec3;
 
@@ -14,6 +15,10 @@ pub trait Contacts {
     /// The work of friction since the last accepted state, which the memory of a state still tells;
     /// negative where friction takes energy.
     fn friction_work(&self, at: &State) -> f64;
+
+    /// The points with friction that may touch in a state, in an order that it shares with states near to
+    /// it.
+    fn rubbing(&self, at: &State) -> Vec<RubbingPoint>;
 
     /// The factors on the stiffness of stick, by the numbers of contacts, with which the springs of all
     /// points reach the limit of friction within the allowed part of the element or the radius.
@@ -91,6 +96,9 @@ pub trait Contacts {
     /// The energy stored in an accepted state: of penalties and of elastic stick.
     fn energy(&self, at: &State) -> f64;
 
+    /// The energy of the springs by which points stick in an accepted state.
+    fn energy_of_holds(&self, at: &State) -> f64;
+
     /// The point that sticks by the longest way of its spring, over its radius, in an accepted state;
     /// `None` where nothing sticks.
     fn softest_stick(&self, at: &State) -> Option<ElasticStick>;
@@ -152,6 +160,25 @@ pub struct Penetration {
     pub(crate) slot: Slot,
     /// Its depth, a length
     pub(crate) depth: f64,
+}
+
+/// A point with friction; vectors in the axes of what carries the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RubbingPoint {
+    /// The friction on the element
+    pub(crate) force: Vec3,
+    /// The sliding since the last accepted state
+    pub(crate) sliding: Vec3,
+    /// The way on which the spring of stick reaches the limit of friction; `None` unless the point slides
+    pub(crate) give: Option<f64>,
+}
+
+impl RubbingPoint {
+    pub(crate) fn of(law: &FrictionLaw, state: &PointState) -> Self {
+        let limit = law.limit(state.normal_force.force);
+        let give = (state.status() == Status::Slides).then_some(limit / law.stiffness);
+        Self { force: state.traction.force, sliding: state.traction.sliding, give }
+    }
 }
 
 /// A point that sticks by a spring.

@@ -20,7 +20,8 @@ mod volume;
 
 pub use batch::{ByOrder, Connection};
 pub use contact_role::{
-    ContactChange, ContactResultant, ContactSurvey, Contacts, ElasticStick, Missed, Penetration, TOLD_PENETRATION,
+    ContactChange, ContactResultant, ContactSurvey, Contacts, ElasticStick, Missed, Penetration, RubbingPoint,
+    TOLD_PENETRATION,
 };
 pub use volume::{VolumeElement, VolumeElements};
 

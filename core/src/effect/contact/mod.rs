@@ -26,7 +26,7 @@ pub use surface::{SceneSurface, SurfaceCarrier};
 
 use super::{
     ContactChange, ContactResultant, ContactSurvey, Contacts, DrivenCoordinates, Effect, ElasticStick, Missed,
-    Penetration, Roles, TOLD_PENETRATION, TangentForm,
+    Penetration, Roles, RubbingPoint, TOLD_PENETRATION, TangentForm,
 };
 use crate::kernel::Weights;
 use crate::kernel::contact::Status;
@@ -165,11 +165,18 @@ impl SurfaceContacts {
 
     /// The energy of elastic stick of the points in memory.
     fn stick_energy(&self, at: &State) -> f64 {
+        self.stick_energy_of(at, &|_| true)
+    }
+
+    /// That of the points that count.
+    fn stick_energy_of(&self, at: &State, counts: &dyn Fn(&PointMemory) -> bool) -> f64 {
         let mut energy = 0.0;
         self.each_spring(at, &mut |_, point, stiffness| {
-            energy += point.weight * point.carried.force.squared() / (2.0 * stiffness)
+            if counts(point) {
+                energy += point.weight * point.carried.force.squared() / (2.0 * stiffness);
+            }
         });
-        energy + self.pairs().stick_energy(at)
+        energy + self.pairs().stick_energy(at, counts)
     }
 
     /// Shows the points in memory of chains with friction, with the stiffness K_t of stick.
@@ -419,6 +426,19 @@ impl Contacts for SurfaceContacts {
             work += self.pairs().friction_work(at);
         }
         work
+    }
+
+    fn rubbing(&self, at: &State) -> Vec<RubbingPoint> {
+        let mut points = Vec::new();
+        if self.rubs() {
+            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+                chain.each_point(Weights::NONE, &mut |point, _| {
+                    points.extend(point.law.friction.map(|law| RubbingPoint::of(&law, point.state)));
+                });
+            });
+            self.pairs().add_rubbing(at, &mut points);
+        }
+        points
     }
 
     fn needed_stick_factors(&self, at: &State) -> Vec<f64> {
@@ -701,6 +721,10 @@ impl Contacts for SurfaceContacts {
             energy += self.pairs().energy(at);
         }
         energy
+    }
+
+    fn energy_of_holds(&self, at: &State) -> f64 {
+        self.stick_energy_of(at, &PointMemory::sticks)
     }
 
     fn softest_stick(&self, at: &State) -> Option<ElasticStick> {

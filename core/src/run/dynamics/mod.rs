@@ -6,6 +6,7 @@ mod grid;
 mod judgement;
 mod massless;
 mod middle;
+mod reversal;
 mod smooth_start;
 mod start;
 mod two_stages;
@@ -272,7 +273,10 @@ impl Dynamics<'_, '_> {
                     let increments = self.increments.as_ref();
                     let ends = self.step_ends();
                     let (error, slot) = control.error(self.stage.model, increments, ends, length);
-                    let taken = control.judge(length, error);
+                    let mut taken = control.judge(length, error);
+                    if taken && !at_floor && self.slides_back(length) {
+                        taken = control.fail(length);
+                    }
                     if !taken && at_floor {
                         let failure = NewtonFailure::StepTooSmall { slot, error, share: control.share(length) };
                         return Err(self.give_up(failure));

@@ -165,7 +165,7 @@ fn lead_of_turns(increments: &Increments, states: [&State; 3], step: f64, factor
 }
 
 /// Moves a state on by some time, with its accelerations and third rates.
-fn advance(state: &mut State, time: f64, jerk: Option<&[Vec3]>) {
+pub(super) fn advance(state: &mut State, time: f64, jerk: Option<&[Vec3]>) {
     let State { q, v, a, .. } = state;
     let (v, a) = (&mut v[..], &mut a[..]);
     for slot in 0..q.len() {

@@ -7,11 +7,11 @@
 use super::candidate::PairCandidate;
 use super::point::PairsNow;
 use super::{BeamPairs, PairRole};
-use crate::effect::ElasticStick;
 use crate::effect::contact::laws::ContactLaws;
+use crate::effect::{ElasticStick, RubbingPoint};
 use crate::kernel::Weights;
 use crate::kernel::contact::{CarriedTraction, FrictionLaw, NodeBefore};
-use crate::system::{ListedPair, PairPointMemory, Slot, State};
+use crate::system::{ListedPair, PairPointMemory, PointMemory, Slot, State};
 use crate::tensor::Mat3;
 
 impl BeamPairs {
@@ -118,6 +118,15 @@ impl PairRole<'_> {
         work
     }
 
+    /// Adds the points with friction that may touch.
+    pub(in crate::effect::contact) fn add_rubbing(self, at: &State, points: &mut Vec<RubbingPoint>) {
+        if self.rubs() {
+            self.now(at).each_point(Weights::NONE, &mut |point, _| {
+                points.extend(point.law.friction.map(|law| RubbingPoint::of(&law, &point.state)));
+            });
+        }
+    }
+
     /// Raises the factors on the stiffness of stick that contacts need to those of their pairs.
     pub(in crate::effect::contact) fn add_needed_stick_factors(self, at: &State, needed: &mut [f64]) {
         let now = self.now(at);
@@ -135,11 +144,13 @@ impl PairRole<'_> {
         });
     }
 
-    /// The energy of elastic stick of the points in memory.
-    pub(in crate::effect::contact) fn stick_energy(self, at: &State) -> f64 {
+    /// The energy of elastic stick of the points in memory that count.
+    pub(in crate::effect::contact) fn stick_energy(self, at: &State, counts: &dyn Fn(&PointMemory) -> bool) -> f64 {
         let mut energy = 0.0;
-        self.each_spring(at, &mut |point, stiffness| {
-            energy += point.point.weight * point.point.carried.force.squared() / (2.0 * stiffness);
+        self.each_spring(at, &mut |PairPointMemory { point, .. }, stiffness| {
+            if counts(point) {
+                energy += point.weight * point.carried.force.squared() / (2.0 * stiffness);
+            }
         });
         energy
     }
