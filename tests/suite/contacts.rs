@@ -1527,3 +1527,27 @@ fn pairs_without_a_contact_are_named() {
     let said = bodies.split("names both: ").nth(1).unwrap();
     assert!(said.starts_with("bodies and each other"), "{bodies}");
 }
+
+/// A rope that slides over a drum everywhere is held together by nothing that is soft.
+#[test]
+fn springs_of_points_that_slide_hold_nothing() {
+    let run = simulate(
+        "[point]\nslack = [1.0032, -0.5, 0]\non = [1.0032, 0, 0]\noff = [-1.0032, 0, 0]\npulled = [-1.0032, -0.5, 0]\n\
+         [section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e-5\nEI = 1e-5\n\
+         [[beam]]\nname = \"left\"\nsection = \"s\"\nthrough = [\"slack\", \"on\"]\nelements = 4\n\
+         [[beam]]\nname = \"top\"\nsection = \"s\"\narc = [\"on\", [0, 1.0032, 0], \"off\"]\nelements = 24\n\
+         [[beam]]\nname = \"right\"\nsection = \"s\"\nthrough = [\"off\", \"pulled\"]\nelements = 4\n\
+         [[load]]\nat = \"slack\"\nforce = [0, -1, 0]\n[[support]]\nat = \"pulled\"\nfix = \"pin\"\nstages = [1]\n\
+         [[support]]\nat = \"pulled\"\nfix = [\"ux\", \"uz\"]\nstages = [2]\n[[motion]]\nat = \"pulled\"\nuy = -0.02\nstages = [2]\n\
+         [[surface]]\nname = \"drum\"\nkind = \"cylinder\"\nfrom = [0, 0, -1]\nto = [0, 0, 1]\nradius = 1\n\
+         [[contact]]\nname = \"rope\"\nbeams = [\"left\", \"top\", \"right\"]\nsurfaces = [\"drum\"]\nradius = 0.001\n\
+         friction = 0.2\npenetration = 1e-6\n[[stage]]\nkind = \"static\"\nsteps = 4\n[[stage]]\nkind = \"static\"\nsteps = 10\n\
+         [output]\nnodes = [\"pulled\"]\ncolumns = [\"reaction\", \"contact\"]\n",
+    );
+    let [points, sliding] = ["rope.points", "rope.sliding"].map(|column| run.end(column));
+    assert!(points > 20.0 && sliding == points, "{sliding} of {points} slide");
+    let pull = run.end("pulled.fy").abs() / (0.2 * std::f64::consts::PI).exp();
+    assert!((pull - 1.0).abs() < 0.02, "{pull}");
+    let soft = run.counters.findings.warnings.iter().find(|warning| warning.kind == WarningKind::SoftStick);
+    assert!(soft.is_none(), "{soft:?}");
+}

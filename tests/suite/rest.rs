@@ -218,6 +218,27 @@ fn a_flat_rod_rolls_over_to_its_soft_side() {
     assert!((simulation.end("rod@0.5.uz") / sag - 1.0).abs() < 0.01, "{} for {sag}", simulation.end("rod@0.5.uz"));
 }
 
+/// A rod without rotary inertia flies, and is clamped in the stage after: its spin is held where nothing else does.
+#[test]
+fn a_spin_is_held_until_something_else_holds_it() {
+    for later in [
+        "[[support]]\nat = \"a\"\nfix = \"all\"\nstages = [2]\n",
+        "[[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"rx\"]\nstages = [2]\n",
+        "[[spring]]\nat = \"a\"\nstiffness = [10, 10, 10, 1, 1, 1]\nstages = [2]\n",
+        "[[motion]]\nat = \"b\"\nrotate = [1, 0, 0]\nangle = 0\nstages = [2]\n",
+    ] {
+        let run = simulate(&format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e6\nGA = 1e6\nGJ = 1e3\nEI = 200\nrhoA = 2\n\
+             [[beam]]\nname = \"rod\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 4\n\
+             [[initial]]\nvelocity = [0, 1, 0]\n{later}[output]\nnodes = [\"b\"]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.01\nstep = 0.001\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 0.001\n"
+        ));
+        let flown = run.column("b.uy")[10];
+        assert!((flown - 0.01).abs() < 1e-12, "{later}: {flown}");
+    }
+}
+
 /// What statics holds may spin in time, where it has inertia, before and after.
 #[test]
 fn a_spin_that_statics_holds_goes_on_in_time() {

@@ -4,7 +4,7 @@
 
 use super::{Effect, FreeSpins, Roles, SomeIncrements, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, StageSet, State};
 use crate::tensor::Vec3;
 
 /// A straight part that may spin freely: beams joined rigidly along a line.
@@ -53,8 +53,10 @@ pub enum HeldIn {
 pub struct SpinHold {
     /// The parts
     pub parts: Vec<SpinningPart>,
-    /// The stages that hold them
+    /// The kinds of stages that hold them
     pub held_in: HeldIn,
+    /// The stages in which nothing else does
+    pub stages: StageSet,
 }
 
 impl Effect for SpinHold {
@@ -81,7 +83,7 @@ impl Effect for SpinHold {
 
     fn acts(&self, stage: &StageContext) -> bool {
         let held_in = if stage.kind.needs_inertia() { HeldIn::Motion } else { HeldIn::Statics };
-        self.held_in == held_in
+        self.held_in == held_in && self.stages.contains(stage.number)
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {

@@ -142,7 +142,7 @@ impl StageRun<'_> {
     /// Parts that friction holds together in a static stage are stiff only as far as its springs are.
     pub fn warn_of_soft_stick_at_rest(&mut self) {
         let Some(contacts) = self.model.contacts() else { return };
-        let [held, strain] = [contacts.energy(self.state), self.model.energy(self.state).strain];
+        let [held, strain] = [contacts.energy_of_holds(self.state), self.model.energy(self.state).strain];
         let is_soft = held > MOST_HELD_BY_STICK * strain && strain > LEAST_STRAIN * held;
         let Some(ElasticStick { contact, .. }) = contacts.softest_stick(self.state).filter(|_| is_soft) else { return };
         if std::mem::replace(&mut self.issued.soft_stick, true) {

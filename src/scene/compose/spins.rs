@@ -1,12 +1,12 @@
 //! Straight parts whose spin about their own axis nothing resists.
 
-use super::Composer;
+use super::{Composer, stage_set};
 use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
 use beamsim_core::effect::Effect;
 use beamsim_core::effect::spin_hold::{HeldIn, SpinHold, SpinningPart};
-use beamsim_core::system::Slot;
+use beamsim_core::system::{Slot, StageSet};
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::{BTreeMap, HashSet};
 
@@ -35,29 +35,47 @@ impl StraightPart<'_> {
 
 impl Composer<'_> {
     pub(super) fn spin_holds(&mut self, connections: &[FoundJoint]) {
-        let parts = self.straight_parts(&self.resisted_rotations(connections));
         let rests = self.deck.stages.iter().any(|stage| !stage.body.kind().needs_inertia());
-        let holds = |is_free: &dyn Fn(&StraightPart) -> bool| -> Vec<SpinningPart> {
-            parts.iter().filter(|part| is_free(part)).map(|part| part.hold.clone()).collect()
-        };
-        let in_motion = holds(&|part| self.dynamic && !self.has_spin_inertia(part));
-        let in_statics = holds(&|part| rests && !self.feels_loads(part));
+        let [mut in_motion, mut in_statics] = [HeldIn::Motion, HeldIn::Statics].map(|held_in| (held_in, Vec::new()));
+        for (resisted, stages) in self.stages_by_resistance(connections) {
+            let parts = self.straight_parts(&resisted);
+            let add = |(held_in, holds): &mut (HeldIn, Vec<SpinHold>), is_free: &dyn Fn(&StraightPart) -> bool| {
+                let parts = parts.iter().filter(|part| is_free(part)).map(|part| part.hold.clone()).collect();
+                holds.push(SpinHold { parts, held_in: *held_in, stages: stages.clone() });
+            };
+            add(&mut in_motion, &|part| self.dynamic && !self.has_spin_inertia(part));
+            add(&mut in_statics, &|part| rests && !self.feels_loads(part));
+        }
         let parts = "straight part(s) free to spin about their own axis";
-        self.hold_spins(
-            SpinHold { parts: in_motion, held_in: HeldIn::Motion },
-            &format!("{parts}, without inertia about it"),
-        );
-        self.hold_spins(
-            SpinHold { parts: in_statics, held_in: HeldIn::Statics },
-            &format!("{parts}, which no load resists: the spin is fixed"),
-        );
+        self.hold_spins(in_motion.1, &format!("{parts}, without inertia about it"));
+        self.hold_spins(in_statics.1, &format!("{parts}, which no load resists: the spin is fixed"));
     }
 
-    fn hold_spins(&mut self, effect: SpinHold, which: &str) {
-        match effect.parts.len() {
-            0 => self.reason(effect.name(), false, format!("no {which}")),
-            count => self.push(effect, format!("{count} {which}")),
+    /// Holds of one kind, each in its stages.
+    fn hold_spins(&mut self, holds: Vec<SpinHold>, which: &str) {
+        let differ = holds.len() > 1;
+        let (held, none): (Vec<SpinHold>, Vec<SpinHold>) = holds.into_iter().partition(|hold| !hold.parts.is_empty());
+        if let (true, Some(hold)) = (held.is_empty(), none.first()) {
+            self.reason(hold.name(), false, format!("no {which}"));
         }
+        for hold in held {
+            let count = hold.parts.len();
+            let stages = if differ { format!(", in stages {}", numbers(&hold.stages)) } else { String::new() };
+            self.push(hold, format!("{count} {which}{stages}"));
+        }
+    }
+
+    /// The rotations that something takes hold of, and the stages in which it does.
+    fn stages_by_resistance(&self, connections: &[FoundJoint]) -> Vec<(HashSet<Slot>, StageSet)> {
+        let mut found: Vec<(HashSet<Slot>, Vec<usize>)> = Vec::new();
+        for stage in 0..self.deck.stages.len() {
+            let resisted = self.resisted_rotations(connections, stage);
+            match found.iter_mut().find(|(known, _)| *known == resisted) {
+                Some((_, stages)) => stages.push(stage),
+                None => found.push((resisted, vec![stage])),
+            }
+        }
+        found.into_iter().map(|(resisted, stages)| (resisted, StageSet(Some(stages)))).collect()
     }
 
     /// Parts on a straight line whose rotation nothing takes hold of.
@@ -163,15 +181,20 @@ impl Composer<'_> {
         found.is_some_and(|(number, _)| part.hold.nodes.contains(&self.mesh.nodes[number].node))
     }
 
-    /// Rotations that supports, motions, joints, springs or bodies beside their node take part in.
-    fn resisted_rotations(&self, connections: &[FoundJoint]) -> HashSet<Slot> {
+    /// Rotations that supports, motions, joints, springs or bodies beside their node take part in, in a
+    /// stage.
+    fn resisted_rotations(&self, connections: &[FoundJoint], stage: usize) -> HashSet<Slot> {
+        let acts = |stages: &Option<Vec<usize>>| stage_set(stages.as_ref()).contains(stage);
         let slot = |number: usize| self.mesh.nodes[number].node.p;
         let named = |name: &Spanned<String>| self.mesh.find_node(self.deck, name).ok().map(|(number, _)| slot(number));
-        let held = self.deck.supports.iter().filter(|support| support.fix[3..].contains(&true));
-        let turned = self.deck.motions.iter().filter(|m| matches!(m.what, MotionWhat::Rotation { .. }));
+        let supports = self.deck.supports.iter().filter(|support| acts(&support.stages));
+        let held = supports.filter(|support| support.fix[3..].contains(&true));
+        let motions = self.deck.motions.iter().filter(|motion| acts(&motion.stages));
+        let turned = motions.filter(|motion| matches!(motion.what, MotionWhat::Rotation { .. }));
         let joined = connections.iter().filter(|connection| connection.joint.kind.holds_rotation());
         let aside = connections.iter().filter(|connection| connection.arms != [Vec3::ZERO; 2]);
-        let sprung = self.out.springs.iter().filter(|s| s.rotation != Mat3::ZERO || s.rotation_damping != Mat3::ZERO);
+        let springs = self.out.springs.iter().filter(|s| self.out.amplitudes[s.amplitude].stages().contains(stage));
+        let sprung = springs.filter(|s| s.rotation != Mat3::ZERO || s.rotation_damping != Mat3::ZERO);
         let heavy = self.deck.bodies.iter().filter(|body| body.offset != [0.0; 3]);
         let mut found: HashSet<Slot> = held.filter_map(|support| named(&support.at)).collect();
         found.extend(turned.filter_map(|motion| named(&motion.at)));
@@ -180,6 +203,12 @@ impl Composer<'_> {
         found.extend(heavy.filter_map(|body| named(&body.at)));
         found
     }
+}
+
+/// The numbers of stages as a deck counts them.
+fn numbers(stages: &StageSet) -> String {
+    let numbers = stages.0.iter().flatten().map(|stage| (stage + 1).to_string());
+    numbers.collect::<Vec<_>>().join(", ")
 }
 
 /// The first of what is joined with a beam.
