@@ -221,10 +221,26 @@ fn describe_syntax(text: &str, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
     let shown = errors.iter().enumerate().filter(|(k, error)| *k == 0 || twice(error));
     let mut shown: Vec<Diagnostic> = shown.map(|(_, error)| describe(error)).collect();
     let hidden = errors.len() - shown.len();
-    if let Some(first) = shown.first_mut().filter(|_| hidden > 0) {
-        first.help = Some(format!("{hidden} more syntax error(s) may be consequences of this one"));
+    if let Some(first) = shown.first_mut() {
+        let unquoted = first.span.as_ref().and_then(|span| unquoted(text, span.start));
+        first.help = match unquoted {
+            Some(value) => Some(format!("text and expressions stand in quotes: \"{value}\"")),
+            None => (hidden > 0).then(|| format!("{hidden} more syntax error(s) may be consequences of this one")),
+        };
     }
     shown
+}
+
+/// The value about this place, if it is a word or an expression without quotes.
+fn unquoted(text: &str, place: usize) -> Option<&str> {
+    let before = text.get(..place)?;
+    let line = before.rfind('\n').map_or(0, |end| end + 1);
+    let start = before[line..].find('=').map(|_| before.rfind(['=', '[', ',']))??;
+    let value = text[start + 1..].split(['\n', '\r', ',', ']', '#']).next()?.trim();
+    let is_expression = |c: char| c.is_ascii_alphanumeric() || " _+-*/().^".contains(c);
+    let begins = value.starts_with(|c: char| c.is_ascii_alphabetic()) || value.contains(['*', '/', '(']);
+    let is_word = begins && value.chars().all(is_expression);
+    (is_word && !value.eq_ignore_ascii_case("true") && !value.eq_ignore_ascii_case("false")).then_some(value)
 }
 
 /// The place of the key with the most dots.

@@ -107,10 +107,12 @@ impl<'a> Has<'a> {
                 any_of(cures)
             }
             Some(Approach::Parts) => {
-                let what = if self.stage.rotating { "`frame`" } else { "`history`" };
-                let stages = match self.stage.rotating {
-                    true => "",
-                    false => " (load and unload in separate stages, with `stages = [1]` in a load)",
+                let (what, stages) = match (self.stage.rotating, tried.may_touch) {
+                    (true, _) => ("`frame`", ""),
+                    (false, true) => ("contact", ""),
+                    (false, false) => {
+                        ("`history`", " (load and unload in separate stages, with `stages = [1]` in a load)")
+                    }
                 };
                 let cures = any_of([self.levels(), self.fall()]);
                 format!(
