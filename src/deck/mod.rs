@@ -222,11 +222,11 @@ fn describe_syntax(text: &str, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
     let mut shown: Vec<Diagnostic> = shown.map(|(_, error)| describe(error)).collect();
     let hidden = errors.len() - shown.len();
     if let Some(first) = shown.first_mut() {
-        let unquoted = first.span.as_ref().and_then(|span| unquoted(text, span.start));
-        first.help = match unquoted {
-            Some(value) => Some(format!("text and expressions stand in quotes: \"{value}\"")),
-            None => (hidden > 0).then(|| format!("{hidden} more syntax error(s) may be consequences of this one")),
-        };
+        let more = (hidden > 0).then(|| format!("{hidden} more syntax error(s) may be consequences of this one"));
+        let value = first.span.as_ref().and_then(|span| unquoted(text, span.start));
+        let quotes = value.map(|value| format!("text and expressions stand in quotes: \"{value}\""));
+        let help: Vec<String> = quotes.into_iter().chain(more).collect();
+        first.help = (!help.is_empty()).then(|| help.join("; "));
     }
     shown
 }
@@ -235,11 +235,13 @@ fn describe_syntax(text: &str, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
 fn unquoted(text: &str, place: usize) -> Option<&str> {
     let before = text.get(..place)?;
     let line = before.rfind('\n').map_or(0, |end| end + 1);
-    let start = before[line..].find('=').map(|_| before.rfind(['=', '[', ',']))??;
-    let value = text[start + 1..].split(['\n', '\r', ',', ']', '#']).next()?.trim();
-    let is_expression = |c: char| c.is_ascii_alphanumeric() || " _+-*/().^".contains(c);
-    let begins = value.starts_with(|c: char| c.is_ascii_alphabetic()) || value.contains(['*', '/', '(']);
-    let is_word = begins && value.chars().all(is_expression);
+    let start = before[line..].find('=').map(|_| before.rfind(['=', '[']))??;
+    let value = text[start + 1..].split(['\n', '\r', ']', '#']).next()?.trim();
+    let begins = value.trim_start_matches('-').starts_with(|c: char| c.is_ascii_alphabetic()) || value.contains('*');
+    let is_expression = |c: char| c.is_ascii_alphanumeric() || " _+-*/().,^".contains(c);
+    let is_whole = value.matches('(').count() == value.matches(')').count();
+    let is_list = value.contains(',') && !value.contains('(');
+    let is_word = begins && is_whole && !is_list && value.chars().all(is_expression);
     (is_word && !value.eq_ignore_ascii_case("true") && !value.eq_ignore_ascii_case("false")).then_some(value)
 }
 

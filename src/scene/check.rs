@@ -331,22 +331,31 @@ pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held
     let mut supports = Vec::new();
     for &node in deck.bodies.iter().filter_map(|body| mesh.points.get(&body.at.value)) {
         let slot = mesh.nodes[node].node.p;
-        let mut touched = Mat3::ZERO;
-        let mut touch = |m: Mat3| {
-            if m.max_abs() > 0.0 {
-                touched += m * (1.0 / m.max_abs());
-            }
-        };
-        bodies.iter().filter(|b| b.node.p == slot).for_each(|b| touch(b.inertia.about_node));
-        springs.iter().filter(|s| s.node.p == slot).for_each(|s| touch(s.rotation));
-        held.iter().flat_map(|s| &s.directions).filter(|d| d.slot == slot).for_each(|d| touch(d.axis.outer(d.axis)));
         let moved =
             |m: &deck::Motion| m.at.value == mesh.name_of(node) && matches!(m.what, MotionWhat::Rotation { .. });
         if on_beams.contains(&node) || jointed.contains(&node) || deck.motions.iter().any(moved) {
             continue;
         }
-        let directions = untouched(touched).into_iter().map(|axis| Direction { slot, axis }).collect();
-        supports.push(Support { directions, stages: StageSet::default() });
+        let holding = || held.iter().filter(|support| support.directions.iter().any(|d| d.slot == slot));
+        let stages = match holding().any(|support| support.stages.0.is_some()) {
+            true => (0..deck.stages.len()).map(|stage| StageSet(Some(vec![stage]))).collect(),
+            false => vec![StageSet::default()],
+        };
+        for stages in stages {
+            let mut touched = Mat3::ZERO;
+            let mut touch = |m: Mat3| {
+                if m.max_abs() > 0.0 {
+                    touched += m * (1.0 / m.max_abs());
+                }
+            };
+            bodies.iter().filter(|b| b.node.p == slot).for_each(|b| touch(b.inertia.about_node));
+            springs.iter().filter(|s| s.node.p == slot).for_each(|s| touch(s.rotation));
+            let holds = |support: &&Support| stages.0.iter().flatten().all(|&stage| support.stages.contains(stage));
+            let directions = holding().filter(holds).flat_map(|support| &support.directions);
+            directions.filter(|d| d.slot == slot).for_each(|d| touch(d.axis.outer(d.axis)));
+            let directions = untouched(touched).into_iter().map(|axis| Direction { slot, axis }).collect();
+            supports.push(Support { directions, stages });
+        }
     }
     supports
 }
@@ -356,7 +365,9 @@ pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held
 pub fn refuse_moments(deck: &Deck, mesh: &Mesh, loose: &[Support], diagnostics: &mut Vec<Diagnostic>) {
     let axes = |node: &str| {
         let slot = mesh.points.get(node).map(|&node| mesh.nodes[node].node.p);
-        let directions = loose.iter().flat_map(|support| &support.directions);
+        // Where a support holds in some stages, a moment may act in those.
+        let always = loose.iter().filter(|support| support.stages.0.is_none());
+        let directions = always.flat_map(|support| &support.directions);
         directions.filter(move |direction| Some(direction.slot) == slot).map(|direction| direction.axis)
     };
     for load in &deck.loads {

@@ -3,7 +3,7 @@
 
 use crate::random::Random;
 use crate::scenes::{Simulation, distance, list, simulate};
-use beamsim_core::tensor::Vec3;
+use beamsim_core::tensor::{Mat3, Vec3};
 
 /// The units of a scene: of lengths, masses and times.
 struct Units {
@@ -22,9 +22,15 @@ impl Units {
         format!("gravity = {}\n[point]\n", list(random.vector(9.81 * self.length / self.time.powi(2))))
     }
 
+    /// A body with principal axes in any direction, slender in some scenes.
     fn body(&self, random: &mut Random) -> String {
-        let inertia = (random.cube(0.04) + Vec3([0.2; 3])) * (self.mass * self.length.powi(2));
-        format!("[[body]]\nat = \"hub\"\nmass = {:e}\ninertia = {}\n", 2.0 * self.mass, list(inertia))
+        let [a, b] = random.axes();
+        let axes = Mat3([a, b, a.cross(b)].map(|axis| axis.0)).transpose();
+        let least = 10.0_f64.powf(random.range(-6.0, 0.0));
+        let principal = Mat3::diagonal([0.2 * least, 0.2, 0.2 + 0.1 * least]).scale(self.mass * self.length.powi(2));
+        let inertia = axes * principal * axes.transpose();
+        let rows = inertia.0.map(|row| list(Vec3(row))).join(", ");
+        format!("[[body]]\nat = \"hub\"\nmass = {:e}\ninertia = [{rows}]\n", 2.0 * self.mass)
     }
 
     fn tail(&self, settings: &str, nodes: &str) -> String {

@@ -239,6 +239,40 @@ fn a_spin_is_held_until_something_else_holds_it() {
     }
 }
 
+/// The rotation of a point mass means nothing, also where a support held it in the stage before.
+#[test]
+fn a_point_mass_may_be_let_go_with_its_rotation() {
+    for fix in ["\"all\"", "[\"ux\", \"uy\", \"rx\", \"ry\", \"rz\"]", "[\"ux\", \"rz\"]"] {
+        let run = simulate(&format!(
+            "gravity = [0, 0, -10]\n[point]\nm = [0, 0, 0]\n[[body]]\nat = \"m\"\nmass = 2\n\
+             [[support]]\nat = \"m\"\naxes = [[0.6, 0.8, 0], [-0.8, 0.6, 0]]\nfix = {fix}\nstages = [1]\n\
+             [output]\nnodes = [\"m\"]\n[[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 1.1\nstep = 0.01\n"
+        ));
+        let fallen = -run.end("m.uz");
+        let exact = if fix == "\"all\"" { 5.0 } else { 5.0 * 1.1 * 1.1 };
+        assert!((fallen / exact - 1.0).abs() < 1e-9, "{fix}: {fallen} for {exact}");
+    }
+}
+
+/// A damper of the spin acts in the stage after with all of its rate.
+#[test]
+fn a_spin_that_is_held_in_one_stage_is_damped_in_the_next() {
+    for scheme in ["newmark", "generalized_alpha", "lobatto"] {
+        let run = simulate(&format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e6\nGA = 1e6\nGJ = 1e3\nEI = 200\nrhoA = 2\n\
+             [[beam]]\nname = \"rod\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 4\n\
+             [[spring]]\nat = \"a\"\nstiffness = [10, 10, 10, 0, 0, 0]\ndamping = [0, 0, 0, 0.5, 0.5, 0.5]\nstages = [2]\n\
+             [[load]]\nat = \"a\"\nmoment = [0.05, 0, 0]\nstages = [2]\n[output]\nnodes = [\"a\"]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.01\nstep = 0.001\nscheme = \"{scheme}\"\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.05\nstep = 0.001\nscheme = \"{scheme}\"\n"
+        ));
+        // Moment over damping, after the first step.
+        let turned = run.end("a.rx") / (0.04 * 0.1);
+        assert!((turned - 1.0).abs() < 0.03, "{scheme}: {turned}");
+    }
+}
+
 /// What statics holds may spin in time, where it has inertia, before and after.
 #[test]
 fn a_spin_that_statics_holds_goes_on_in_time() {

@@ -215,6 +215,31 @@ fn large_scenes_know_their_errors_too_and_the_proposed_step_will_do() {
     }
 }
 
+/// A cantilever of 60 elements under sudden weight, whose second mode long steps do not resolve: its error counts
+/// several times.
+#[test]
+fn large_scenes_know_their_errors_with_a_stage_in_the_middle_of_steps() {
+    let run = |step: f64| {
+        simulate(&format!(
+            "gravity = [0, 0, -0.1]\n[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n\
+             [section.s]\nEA = 1e3\nGA = 1e3\nGJ = 1\nEI = 1\nrhoA = 1\n\
+             [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 60\n\
+             [[support]]\nat = \"a\"\nfix = \"all\"\n[output]\nnodes = [\"b\"]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 6\nstep = {step}\nscheme = \"lobatto\"\n"
+        ))
+    };
+    let exact = run(0.025).column("b.uz");
+    for (step, stride, is_told) in [(0.5, 20, true), (0.4, 16, true), (0.1, 4, false)] {
+        let simulation = run(step);
+        let off = largest_difference(&simulation.column("b.uz"), |k| exact[stride * k]);
+        let Largest { displacement, moved, .. } = estimated(&simulation);
+        let of = format!("step {step}: {displacement:e} for {off:e} of {moved:e}");
+        println!("{of}");
+        assert!((0.2..5.0).contains(&(displacement / off)), "{of}");
+        assert_eq!(doubts(&simulation).contains(&WarningKind::LongSteps), is_told, "{of}");
+    }
+}
+
 /// Sums of local errors are taken every fourth step: what is left over at the end counts, too.
 #[test]
 fn short_stages_of_large_scenes_know_their_errors() {

@@ -16,8 +16,7 @@ pub trait Contacts {
     /// negative where friction takes energy.
     fn friction_work(&self, at: &State) -> f64;
 
-    /// The points with friction that may touch in a state, in an order that it shares with states near to
-    /// it.
+    /// The points with friction that may touch in a state.
     fn rubbing(&self, at: &State) -> Vec<RubbingPoint>;
 
     /// The factors on the stiffness of stick, by the numbers of contacts, with which the springs of all
@@ -165,19 +164,28 @@ pub struct Penetration {
 /// A point with friction; vectors in the axes of what carries the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RubbingPoint {
+    /// The beam or body and what it touches, and the place along the beam in elements
+    pub(crate) place: (usize, f64),
     /// The friction on the element
     pub(crate) force: Vec3,
     /// The sliding since the last accepted state
     pub(crate) sliding: Vec3,
     /// The way on which the spring of stick reaches the limit of friction; `None` unless the point slides
-    pub(crate) give: Option<f64>,
+    pub(crate) stick_way: Option<f64>,
 }
 
 impl RubbingPoint {
-    pub(crate) fn of(law: &FrictionLaw, state: &PointState) -> Self {
+    pub(crate) fn of(place: (usize, f64), law: &FrictionLaw, state: &PointState) -> Self {
         let limit = law.limit(state.normal_force.force);
-        let give = (state.status() == Status::Slides).then_some(limit / law.stiffness);
-        Self { force: state.traction.force, sliding: state.traction.sliding, give }
+        let stick_way = (state.status() == Status::Slides).then_some(limit / law.stiffness);
+        Self { place, force: state.traction.force, sliding: state.traction.sliding, stick_way }
+    }
+
+    /// The point of another state that is nearest to this one, between the same bodies.
+    pub(crate) fn nearest_of<'a>(&self, points: &'a [Self]) -> Option<&'a Self> {
+        let distance = |point: &&Self| (point.place.1 - self.place.1).abs();
+        let same = points.iter().filter(|point| point.place.0 == self.place.0);
+        same.min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 }
 

@@ -4,7 +4,9 @@
 
 use super::{Effect, FreeSpins, Roles, SomeIncrements, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, StageSet, State};
+use crate::system::{
+    Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, StageKind, StageSet, State,
+};
 use crate::tensor::Vec3;
 
 /// A straight part that may spin freely: beams joined rigidly along a line.
@@ -44,6 +46,21 @@ pub enum HeldIn {
     Statics,
 }
 
+impl HeldIn {
+    /// The stages that a stage of some kind belongs to.
+    pub fn stages_of(kind: StageKind) -> Self {
+        if kind.needs_inertia() { Self::Motion } else { Self::Statics }
+    }
+
+    /// The name of the effect.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Motion => "hold of spins without inertia",
+            Self::Statics => "hold of free spins",
+        }
+    }
+}
+
 /// The hold of all parts that may spin freely.
 ///
 /// It has no force and does not change balance. It adds to the tangent a stiffness against
@@ -61,10 +78,7 @@ pub struct SpinHold {
 
 impl Effect for SpinHold {
     fn name(&self) -> &'static str {
-        match self.held_in {
-            HeldIn::Motion => "hold of spins without inertia",
-            HeldIn::Statics => "hold of free spins",
-        }
+        self.held_in.name()
     }
 
     fn category(&self) -> Category {
@@ -82,8 +96,7 @@ impl Effect for SpinHold {
     }
 
     fn acts(&self, stage: &StageContext) -> bool {
-        let held_in = if stage.kind.needs_inertia() { HeldIn::Motion } else { HeldIn::Statics };
-        self.held_in == held_in && self.stages.contains(stage.number)
+        self.held_in == HeldIn::stages_of(stage.kind) && self.stages.contains(stage.number)
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {

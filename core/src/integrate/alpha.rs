@@ -59,6 +59,9 @@ pub enum Stages {
     MiddleAndEnd,
 }
 
+/// The local error of Lobatto IIIA over h^5 q^(5), see [`super::carried_error`].
+pub(super) const LOBATTO_ERROR: f64 = 1.0 / 720.0;
+
 /// Factors of the local error below this, without unit, count as zero.
 const LEAST_ERROR_FACTOR: f64 = 1e-6;
 
@@ -186,7 +189,7 @@ impl Step {
                 (0.5 - gamma - lag) * h * h,
                 (1.0 / 6.0 - lag * (alpha_m - 0.5) - gamma * (0.5 + lag)) * h * h,
             ],
-            Stages::MiddleAndEnd => [h.powi(5) / 720.0, 0.0, -0.25 / 720.0 * h.powi(4)],
+            Stages::MiddleAndEnd => [LOBATTO_ERROR * h.powi(5), 0.0, -0.25 * LOBATTO_ERROR * h.powi(4)],
         }
     }
 

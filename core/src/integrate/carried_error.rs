@@ -39,6 +39,7 @@
 //! do not resolve is bounded by the size of the motion, which a linear equation does not know;
 //! slopes over several steps do not see it.
 
+use super::alpha::LOBATTO_ERROR;
 use super::time_error::{Correct, Largest, Scene, StepEnds, is_to_switch};
 use super::{Increments, Method, Scheme, Stages, Step};
 use crate::kernel::Weights;
@@ -376,7 +377,7 @@ impl CarriedError {
         self.steps += 1;
         let own = self.steps % SLOPE_STEPS;
         self.lengths[own] = h;
-        let local = LocalErrors::new(&self.step, own, self.lengths.iter().sum());
+        let local = LocalErrors::new(&self.step, own, self.lengths.iter().sum(), self.before);
         // Without a solution the error is kept: a free continuation would exaggerate errors of
         // stiff motions.
         let found = self.known == Known::Error;
@@ -557,23 +558,27 @@ struct LocalErrors {
     place: usize,
     /// One over the sum of the lengths of the steps of a slope, 1/time
     per_span: f64,
+    /// True for the first step of its length, whose second differences do not compare with those before
+    is_first: bool,
 }
 
 impl LocalErrors {
-    /// Of a step whose index in lists of the last steps is `place`, and with which the last
-    /// [`SLOPE_STEPS`] have taken the time `span`.
-    fn new(step: &Step, place: usize, span: f64) -> Self {
+    /// Of a step whose index in lists of the last steps is `place`. With it the last [`SLOPE_STEPS`] have
+    /// taken the time `span`; the one before took `before`.
+    fn new(step: &Step, place: usize, span: f64, before: f64) -> Self {
         let factors = step.error_factors();
         let length = step.length;
         match step.scheme.stages {
             Stages::End => {
                 let [steps, settling] = [SLOPE_STEPS; 2];
-                Self { factors, of_apparent: 0.0, length, steps, settling, place, per_span: 1.0 / span }
+                let per_span = 1.0 / span;
+                Self { factors, of_apparent: 0.0, length, steps, settling, place, per_span, is_first: false }
             }
             // Such steps are long: slopes over several would miss much of the motion.
             Stages::MiddleAndEnd => {
-                let of_apparent = 1.25 / 720.0 * length.powi(4);
-                Self { factors, of_apparent, length, steps: 1, settling: 2, place, per_span: 1.0 / length }
+                let of_apparent = 1.25 * LOBATTO_ERROR * length.powi(4);
+                let is_first = length != before;
+                Self { factors, of_apparent, length, steps: 1, settling: 2, place, per_span: 1.0 / length, is_first }
             }
         }
     }
@@ -590,7 +595,7 @@ impl LocalErrors {
         let after = step_ends.rate_of_error(k);
         let before = match step_ends.middle {
             None => step_ends.from.a[k],
-            Some(_) if slot.age == 0 => after,
+            Some(_) if slot.age == 0 || self.is_first => after,
             Some(_) => slot.past[self.earlier(1)],
         };
         [before, after]
@@ -606,6 +611,9 @@ impl LocalErrors {
     /// The local errors tau and tau', from the rates of the error at both ends of the step.
     #[inline(always)]
     fn of(&self, slot: &mut SlotError, [before, after]: [Vec3; 2]) -> [Vec3; 2] {
+        if self.is_first {
+            slot.age = 0;
+        }
         if slot.age == 0 {
             // Rates before the first step are taken to be those at its start.
             slot.past = [before; SLOPE_STEPS];

@@ -152,6 +152,8 @@ pub struct TimeError {
     /// Accelerations, by moments and by the spin itself (spatial), of rotations whose unknowns are
     /// increments, at the last update of the sum
     past_turns: Vec<[Vec3; 2]>,
+    /// The length of the step before the present one
+    before: f64,
     /// The number of steps so far
     steps: usize,
     /// The number of steps of the whole stage
@@ -201,6 +203,7 @@ impl TimeError {
                 .flat_map(|increments| increments.accelerations(state))
                 .map(|a| [a.driven, a.free])
                 .collect(),
+            before: first.length,
             steps: 0,
             of_steps: duration / first.length,
             longest: None,
@@ -223,6 +226,7 @@ impl TimeError {
 
     /// Begins an attempt at a step; `before` is the length of the step before.
     pub fn begin(&mut self, step: &Step, before: f64) {
+        self.before = before;
         if let Some(carried) = &mut self.carried {
             carried.begin(step, before);
         }
@@ -277,7 +281,17 @@ impl TimeError {
         }
         self.steps += 1;
         self.longest = self.longest.filter(|longest| longest.length >= step.length).or(Some(*step));
-        if self.steps.is_multiple_of(SLOPE_STEPS) {
+        let is_due = match step.scheme.stages {
+            Stages::End => self.steps.is_multiple_of(SLOPE_STEPS),
+            // Such steps are long. Second differences of steps of unequal length do not compare.
+            Stages::MiddleAndEnd => {
+                if step.length != self.before {
+                    self.past.fill(UNKNOWN);
+                }
+                true
+            }
+        };
+        if is_due {
             self.sum_up(&system.pattern.dof_map, step_ends, increments);
             if self.is_worth_carrying() {
                 self.carry(system, step_ends.to, *step);

@@ -394,8 +394,9 @@ impl Model {
     }
 
     /// Before a step is predicted, see [`crate::effect::FreeSpins::steady`].
-    pub fn steady(&self, state: &mut State) {
-        self.effects.iter().filter_map(|effect| effect.roles().spins).for_each(|spins| spins.steady(state));
+    pub fn steady(&self, stage: &StageContext, state: &mut State) {
+        let acting = self.effects.iter().filter(|effect| effect.acts(stage));
+        acting.filter_map(|effect| effect.roles().spins).for_each(|spins| spins.steady(state));
     }
 
     /// After a converged state: turns of joints are counted, multipliers have no rates.

@@ -4,7 +4,6 @@ use super::{Composer, stage_set};
 use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
-use beamsim_core::effect::Effect;
 use beamsim_core::effect::spin_hold::{HeldIn, SpinHold, SpinningPart};
 use beamsim_core::system::{Slot, StageSet};
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -41,22 +40,26 @@ impl Composer<'_> {
             let parts = self.straight_parts(&resisted);
             let add = |(held_in, holds): &mut (HeldIn, Vec<SpinHold>), is_free: &dyn Fn(&StraightPart) -> bool| {
                 let parts = parts.iter().filter(|part| is_free(part)).map(|part| part.hold.clone()).collect();
-                holds.push(SpinHold { parts, held_in: *held_in, stages: stages.clone() });
+                let is_of_kind = |stage: &usize| HeldIn::stages_of(self.deck.stages[*stage].body.kind()) == *held_in;
+                let stages: Vec<usize> = stages.iter().copied().filter(is_of_kind).collect();
+                if !stages.is_empty() {
+                    holds.push(SpinHold { parts, held_in: *held_in, stages: StageSet(Some(stages)) });
+                }
             };
             add(&mut in_motion, &|part| self.dynamic && !self.has_spin_inertia(part));
             add(&mut in_statics, &|part| rests && !self.feels_loads(part));
         }
         let parts = "straight part(s) free to spin about their own axis";
-        self.hold_spins(in_motion.1, &format!("{parts}, without inertia about it"));
-        self.hold_spins(in_statics.1, &format!("{parts}, which no load resists: the spin is fixed"));
+        self.hold_spins(in_motion, &format!("{parts}, without inertia about it"));
+        self.hold_spins(in_statics, &format!("{parts}, which no load resists: the spin is fixed"));
     }
 
     /// Holds of one kind, each in its stages.
-    fn hold_spins(&mut self, holds: Vec<SpinHold>, which: &str) {
+    fn hold_spins(&mut self, (held_in, holds): (HeldIn, Vec<SpinHold>), which: &str) {
         let differ = holds.len() > 1;
-        let (held, none): (Vec<SpinHold>, Vec<SpinHold>) = holds.into_iter().partition(|hold| !hold.parts.is_empty());
-        if let (true, Some(hold)) = (held.is_empty(), none.first()) {
-            self.reason(hold.name(), false, format!("no {which}"));
+        let held: Vec<SpinHold> = holds.into_iter().filter(|hold| !hold.parts.is_empty()).collect();
+        if held.is_empty() {
+            self.reason(held_in.name(), false, format!("no {which}"));
         }
         for hold in held {
             let count = hold.parts.len();
@@ -65,8 +68,8 @@ impl Composer<'_> {
         }
     }
 
-    /// The rotations that something takes hold of, and the stages in which it does.
-    fn stages_by_resistance(&self, connections: &[FoundJoint]) -> Vec<(HashSet<Slot>, StageSet)> {
+    /// The rotations that something resists, each time with the stages in which it does.
+    fn stages_by_resistance(&self, connections: &[FoundJoint]) -> Vec<(HashSet<Slot>, Vec<usize>)> {
         let mut found: Vec<(HashSet<Slot>, Vec<usize>)> = Vec::new();
         for stage in 0..self.deck.stages.len() {
             let resisted = self.resisted_rotations(connections, stage);
@@ -75,7 +78,7 @@ impl Composer<'_> {
                 None => found.push((resisted, vec![stage])),
             }
         }
-        found.into_iter().map(|(resisted, stages)| (resisted, StageSet(Some(stages)))).collect()
+        found
     }
 
     /// Parts on a straight line whose rotation nothing takes hold of.

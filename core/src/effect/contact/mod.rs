@@ -431,12 +431,13 @@ impl Contacts for SurfaceContacts {
     fn rubbing(&self, at: &State) -> Vec<RubbingPoint> {
         let mut points = Vec::new();
         if self.rubs() {
-            self.each_chain(at, Weights::NONE, &mut |_, chain| {
+            self.each_chain(at, Weights::NONE, &mut |number, chain| {
                 chain.each_point(Weights::NONE, &mut |point, _| {
-                    points.extend(point.law.friction.map(|law| RubbingPoint::of(&law, point.state)));
+                    let place = (number, point.candidate.along());
+                    points.extend(point.law.friction.map(|law| RubbingPoint::of(place, &law, point.state)));
                 });
             });
-            self.pairs().add_rubbing(at, &mut points);
+            self.pairs().add_rubbing(at, self.chains.len(), &mut points);
         }
         points
     }

@@ -123,8 +123,11 @@ impl Dynamics<'_, '_> {
         let StageRun { assembly, newton, good, state, counters, issued, number, .. } = &mut *self.stage;
         let Some(error) = &mut newton.time_error else { return };
         let middle = self.middle.as_ref().map(|middle| &middle.state);
-        let ends = StepEnds { from: good, middle, to: state };
-        error.sum_up(&assembly.system.pattern.dof_map, ends, self.increments.as_ref());
+        // A step that failed has no end.
+        if state.time > good.time {
+            let ends = StepEnds { from: good, middle, to: state };
+            error.sum_up(&assembly.system.pattern.dof_map, ends, self.increments.as_ref());
+        }
         let largest = error.largest();
         counters.findings.time_errors.push(StageTimeError { stage: *number + 1, largest });
         // What is left of a motion that has died away may err by its own size.

@@ -1,8 +1,8 @@
 //! Directions of unknowns that no mass resists, where a mass matrix is solved with.
 //!
 //! The matrix is singular along them. Where the gaps of joints tie such a direction to something
-//! that has mass, it follows that, without force: a mass of its own there, however small, would take
-//! momentum from the rest. Along the others nothing happens.
+//! that has mass, it follows that motion, and transmits forces: a mass of its own there would take
+//! momentum from the rest. Along the other directions solutions are zero.
 
 use crate::model::{Model, SlotKind};
 use crate::system::{DofMap, Slot, System};
@@ -11,21 +11,25 @@ use crate::threads;
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An eigenvalue of a diagonal block of a mass matrix over its largest entry that is none.
+/// The largest eigenvalue of a diagonal block of a mass matrix, over its largest entry, that counts as
+/// zero.
 const NO_MASS: f64 = 1e-12;
 
-/// Slopes of gaps, without unit, that are none.
+/// The largest slope of a gap, over the largest one of the gap, that counts as zero.
 const NO_SLOPE: f64 = 1e-6;
 
-/// Mass that is added where joints tie a direction, over the mass that moves with it: so much of its
-/// effect is left by each round of [`Massless::solve`].
-const LIGHT: f64 = 1e-3;
+/// The mass that is added where joints tie a direction, over the least mass that it is tied to. Each round
+/// of [`Massless::solve`] leaves about this part of its effect.
+const ADDED_SHARE: f64 = 1e-6;
 
 /// The most rounds of [`Massless::solve`].
 const MOST_ROUNDS: usize = 30;
 
-/// The effect of added masses, over that of the first round, that is round-off.
+/// The change of the forces of added masses in a round, over that of the first one, that is round-off.
 const ROUND_OFF: f64 = 1e-13;
+
+/// The change in a round, over that in the round before, from which on it is taken for round-off.
+const SLOWEST: f64 = 0.95;
 
 /// The directions without mass of a system.
 pub(super) struct Massless {
@@ -46,13 +50,13 @@ struct Directions {
 }
 
 impl Massless {
-    /// The directions without mass of a system, which holds its mass matrix. Forces along those that
-    /// no joint ties are taken from `right_hand_side`.
-    pub fn find(system: &System, model: &Model, right_hand_side: &mut [f64]) -> Self {
+    /// The directions without mass of a system, which holds its mass matrix. Removes the forces along
+    /// those that no joint ties from `right_hand_side`.
+    pub fn release(system: &System, model: &Model, right_hand_side: &mut [f64]) -> Self {
         let mut all = massless_directions(system, model);
         let ties = Ties::new(system, model, &all);
         ties.lighten(system, &mut all);
-        ties.take_free_forces(system, &all, right_hand_side);
+        ties.remove_free_forces(system, &all, right_hand_side);
         let addition = |(&slot, Directions { axes, mass, .. }): (&Slot, &Directions)| {
             (slot, axes.iter().fold(Mat3::ZERO, |sum, &axis| sum + axis.outer(axis)).scale(*mass))
         };
@@ -67,25 +71,27 @@ impl Massless {
         right_hand_side: &mut [f64],
         mut solve: impl FnMut(&mut [f64]) -> bool,
     ) -> bool {
+        if !self.are_tied {
+            return solve(right_hand_side);
+        }
         let given = right_hand_side.to_vec();
         let mut solved = solve(right_hand_side);
-        let mut last: Vec<Vec3> = vec![Vec3::ZERO; self.additions.len()];
-        let mut first_change = 0.0;
-        for round in 0..if self.are_tied { MOST_ROUNDS } else { 0 } {
+        let mut last = vec![Vec3::ZERO; self.additions.len()];
+        let (mut first_change, mut last_change) = (0.0, f64::INFINITY);
+        for round in 0..MOST_ROUNDS {
             let force = |(slot, mass): &(Slot, Mat3)| *mass * at(dof_map, *slot, right_hand_side);
             let forces: Vec<Vec3> = self.additions.iter().map(force).collect();
             let change = forces.iter().zip(&last).fold(0.0, |m: f64, (&now, &last)| m.max((now - last).norm()));
             first_change = if round == 0 { change } else { first_change };
-            if !solved || change <= ROUND_OFF * first_change {
+            // What does not fall any more is round-off.
+            if !solved || change <= ROUND_OFF * first_change || change >= SLOWEST * last_change {
                 break;
             }
             right_hand_side.copy_from_slice(&given);
-            self.additions
-                .iter()
-                .zip(&forces)
-                .for_each(|((slot, _), &force)| add(dof_map, *slot, force, right_hand_side));
+            let additions = self.additions.iter().zip(&forces);
+            additions.for_each(|((slot, _), &force)| add(dof_map, *slot, force, right_hand_side));
             solved = solve(right_hand_side);
-            last = forces;
+            (last, last_change) = (forces, change);
         }
         solved
     }
@@ -110,8 +116,7 @@ fn massless_directions(system: &System, model: &Model) -> BTreeMap<Slot, Directi
     let moves = |slot: &usize| matches!(model.kinds[*slot], SlotKind::Displacement | SlotKind::Rotation);
     let directions = |slot: usize| {
         let (block, mass) = with_mass_where_held(system, slot as Slot);
-        let symmetric = Matrix3::from_fn(|i, j| 0.5 * (block.0[i][j] + block.0[j][i]));
-        let eigen = SymmetricEigen::new(symmetric);
+        let eigen = eigen_of(&block);
         let is_none = |k: &usize| eigen.eigenvalues[*k].abs() <= NO_MASS * mass;
         let axis = |k: usize| Vec3([0, 1, 2].map(|i| eigen.eigenvectors[(i, k)]));
         let is_massive = system.own_block(slot as Slot).max_abs() > 0.0;
@@ -163,8 +168,10 @@ impl Ties {
     /// part of that.
     fn lighten(&self, system: &System, all: &mut BTreeMap<Slot, Directions>) {
         let own_mass = |slot: Slot| {
-            let diagonal = system.own_block(slot);
-            let least = (0..3).map(|k| diagonal.0[k][k]).filter(|&mass| mass > 0.0).fold(f64::INFINITY, f64::min);
+            let eigen = eigen_of(&system.own_block(slot)).eigenvalues;
+            let largest = eigen.iter().fold(0.0, |m: f64, mass| m.max(mass.abs()));
+            let least =
+                eigen.iter().filter(|&&mass| mass > NO_MASS * largest).fold(f64::INFINITY, |m, &mass| m.min(mass));
             least / self.scale[slot as usize].powi(2)
         };
         let is_massive = |slot: Slot| all.get(&slot).is_none_or(|directions| directions.is_massive);
@@ -189,13 +196,13 @@ impl Ties {
         }
         for (slot, mass) in known {
             if let Some(directions) = all.get_mut(&slot) {
-                directions.mass = LIGHT * mass * self.scale[slot as usize].powi(2);
+                directions.mass = ADDED_SHARE * mass * self.scale[slot as usize].powi(2);
             }
         }
     }
 
-    /// Takes the forces along directions that no joint ties from a right-hand side.
-    fn take_free_forces(&self, system: &System, all: &BTreeMap<Slot, Directions>, right_hand_side: &mut [f64]) {
+    /// Removes the forces along directions that no joint ties from a right-hand side.
+    fn remove_free_forces(&self, system: &System, all: &BTreeMap<Slot, Directions>, right_hand_side: &mut [f64]) {
         let dof_map = &system.pattern.dof_map;
         let mut free = Along::new();
         let tied = self.tied(all);
@@ -278,6 +285,10 @@ fn with_mass_where_held(system: &System, slot: Slot) -> (Mat3, f64) {
         block.0[k][k] += mass;
     }
     (block, mass)
+}
+
+fn eigen_of(block: &Mat3) -> SymmetricEigen<f64, nalgebra::Const<3>> {
+    SymmetricEigen::new(Matrix3::from_fn(|i, j| 0.5 * (block.0[i][j] + block.0[j][i])))
 }
 
 /// True if a matrix has no eigenvalue that is next to nothing beside its entries: none is larger

@@ -177,8 +177,13 @@ impl Dynamics<'_, '_> {
         Step { scheme: self.settings.scheme, length: self.settings.step }
     }
 
-    /// The errors of fixed steps are estimated from here on.
+    /// The errors of fixed steps are estimated from here on. With a stage in the middle, joints with
+    /// multipliers and contacts change accelerations by more than the motion does.
     fn follow_errors(&mut self) {
+        let model = self.stage.model;
+        if self.middle.is_some() && (!model.multipliers.is_empty() || model.contacts().is_some()) {
+            return;
+        }
         let first = self.first_step();
         let StageRun { assembly, newton, state, model, .. } = &mut *self.stage;
         let increments = self.increments.as_ref();
@@ -274,7 +279,7 @@ impl Dynamics<'_, '_> {
                     let ends = self.step_ends();
                     let (error, slot) = control.error(self.stage.model, increments, ends, length);
                     let mut taken = control.judge(length, error);
-                    if taken && !at_floor && self.slides_back(length) {
+                    if taken && !at_floor && self.slides_back(length, control.share(length)) {
                         taken = control.fail(length);
                     }
                     if !taken && at_floor {
@@ -376,13 +381,19 @@ impl Dynamics<'_, '_> {
         Ok(())
     }
 
+    /// Removes spins that are round-off from the rates.
+    fn steady(&mut self) {
+        let StageRun { plan, number, state, model, .. } = &mut *self.stage;
+        if !self.rateless.is_empty() {
+            model.steady(&plan.stages[*number].context(*number), state);
+        }
+    }
+
     /// Predicts the state at the end of a step by its scheme, and puts prescribed directions where
     /// they belong.
     fn predict(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
+        self.steady();
         let StageRun { newton, state, model, schedule, .. } = &mut *self.stage;
-        if !self.rateless.is_empty() {
-            model.steady(state);
-        }
         if let Some(error) = &mut newton.time_error {
             error.begin(&step, self.last_length);
         }

@@ -270,7 +270,7 @@ impl Dynamics<'_, '_> {
         }
         let mut right_hand_side = vec![0.0; system.pattern.dof_map.count()];
         system.right_hand_side(&mut right_hand_side);
-        let massless = Massless::find(system, model, &mut right_hand_side);
+        let massless = Massless::release(system, model, &mut right_hand_side);
         massless.additions.iter().for_each(|(slot, block)| system.add_to_own_block(*slot, block));
         counters.work.factorisations += 1;
         let mut mass = Tangent::that_may_go(assembly, state, Weights::MASS).with(&massless.additions);

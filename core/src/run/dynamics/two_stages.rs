@@ -14,6 +14,7 @@ impl Dynamics<'_, '_> {
     /// Predicts both stages of a step, puts prescribed directions where they belong, and finds the
     /// balance of both.
     pub(super) fn find_stages(&mut self, middle: &mut Middle, step: &Step, next: f64) -> Result<(), NewtonFailure> {
+        self.steady();
         let StageRun { assembly, newton, state, model, schedule, counters, bookkeeper, keeps_account, .. } =
             &mut *self.stage;
         if let Some(error) = &mut newton.time_error {
@@ -22,9 +23,6 @@ impl Dynamics<'_, '_> {
         let length = step.length;
         let step = Lobatto { length };
         let Middle { state: middle, predictor } = middle;
-        if !self.rateless.is_empty() {
-            model.steady(state);
-        }
         middle.copy_from(state);
         step.predict(middle, state);
         let dof_map = &assembly.system.pattern.dof_map;

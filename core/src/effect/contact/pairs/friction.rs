@@ -118,11 +118,13 @@ impl PairRole<'_> {
         work
     }
 
-    /// Adds the points with friction that may touch.
-    pub(in crate::effect::contact) fn add_rubbing(self, at: &State, points: &mut Vec<RubbingPoint>) {
+    /// Adds the points with friction that may touch; meetings of beams count from `first`.
+    pub(in crate::effect::contact) fn add_rubbing(self, at: &State, first: usize, points: &mut Vec<RubbingPoint>) {
         if self.rubs() {
             self.now(at).each_point(Weights::NONE, &mut |point, _| {
-                points.extend(point.law.friction.map(|law| RubbingPoint::of(&law, &point.state)));
+                let [on_first, _] = point.pair.elements;
+                let place = (first + point.pair.meeting as usize, f64::from(on_first) + point.candidate.at[0]);
+                points.extend(point.law.friction.map(|law| RubbingPoint::of(place, &law, &point.state)));
             });
         }
     }
