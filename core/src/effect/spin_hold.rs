@@ -47,7 +47,7 @@ pub enum HeldIn {
 }
 
 impl HeldIn {
-    /// The stages that a stage of some kind belongs to.
+    /// Those among which a stage of some kind is.
     pub fn stages_of(kind: StageKind) -> Self {
         if kind.needs_inertia() { Self::Motion } else { Self::Statics }
     }

@@ -97,7 +97,7 @@ pub(super) struct CarriedError {
     /// The factor that scales the error to [`SCALED_ERROR`]; zero while there is no error
     scaling: f64,
     known: Known,
-    /// The impulses that the means of forces at both ends of the last steps have missed where forces
+    /// The impulses that means of forces at instants of the last steps have missed where forces
     /// jumped, by slot (internal, spatial), and that have not yet acted on the error
     missed: Vec<(Slot, Vec3)>,
     /// True if forces have jumped
@@ -357,7 +357,7 @@ impl CarriedError {
         }
     }
 
-    /// Takes over what the means of forces at both ends of the step have missed, by slot. What was
+    /// Takes over what the mean of forces at instants of the step has missed, by slot. What was
     /// missed before acts no more once it is in the error.
     pub fn miss(&mut self, missed: Vec<(Slot, Vec3)>) {
         if self.known == Known::Error {

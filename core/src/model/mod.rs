@@ -243,7 +243,7 @@ impl Model {
         self.effects.iter().filter_map(|effect| effect.roles().force_jumps)
     }
 
-    /// What the means of forces at both ends of a step of some length miss where forces jump, by
+    /// What means of forces at some instants of a step of some length miss where forces jump, by
     /// slot; see [`ForceJumps::missed`].
     pub fn missed(&self, instants: &[(f64, &State)], length: f64) -> Vec<(Slot, Vec3)> {
         let mut missed = Vec::new();

@@ -168,7 +168,7 @@ impl SurfaceContacts {
         self.stick_energy_of(at, &|_| true)
     }
 
-    /// That of the points that count.
+    /// The energy of elastic stick of some points in memory: those for which `counts` is true.
     fn stick_energy_of(&self, at: &State, counts: &dyn Fn(&PointMemory) -> bool) -> f64 {
         let mut energy = 0.0;
         self.each_spring(at, &mut |_, point, stiffness| {

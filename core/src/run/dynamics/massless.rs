@@ -11,11 +11,11 @@ use crate::threads;
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The largest eigenvalue of a diagonal block of a mass matrix, over its largest entry, that counts as
-/// zero.
+/// The largest eigenvalue of a diagonal block of a mass matrix that counts as zero, over the largest entry
+/// of the block.
 const NO_MASS: f64 = 1e-12;
 
-/// The largest slope of a gap, over the largest one of the gap, that counts as zero.
+/// The largest slope of a gap that counts as zero, over the largest slope of the same gap.
 const NO_SLOPE: f64 = 1e-6;
 
 /// The mass that is added where joints tie a direction, over the least mass that it is tied to. Each round

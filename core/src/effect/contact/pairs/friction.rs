@@ -146,7 +146,7 @@ impl PairRole<'_> {
         });
     }
 
-    /// The energy of elastic stick of the points in memory that count.
+    /// The energy of elastic stick of some points in memory: those for which `counts` is true.
     pub(in crate::effect::contact) fn stick_energy(self, at: &State, counts: &dyn Fn(&PointMemory) -> bool) -> f64 {
         let mut energy = 0.0;
         self.each_spring(at, &mut |PairPointMemory { point, .. }, stiffness| {
