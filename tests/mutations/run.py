@@ -5,7 +5,7 @@ patch names, decks (by `beamsim verify`) or a test (by `cargo test`), then fails
     tests/mutations/run.py [NAME ...] [--table FILE] [--target FOLDER] [--timeout SECONDS]
     tests/mutations/run.py --applies
 
-A patch begins with lines `# mistake:`, `# names:` (decks, or `test module::name`), `# why:`. A mutant that does not
+A patch begins with lines `# mistake:`, `# names:` (decks, or `test` and tests `module::name` and decks), `# why:`. A mutant that does not
 apply or build is an error, not a success; `--applies` only looks whether each one applies. Exit status: 0 all found,
 1 a mutant survives, 2 an error of the suite.
 Builds are incremental and without optimisation; where one has been killed and the next does not link, remove the
@@ -46,9 +46,9 @@ def read(patch):
     head = dict(re.findall(r"^# (mistake|names|why): (.+)$", text, re.M))
     if len(head) != 3:
         raise SuiteError(f"{patch.name}: needs `# mistake:`, `# names:` and `# why:`")
-    words = head["names"].split()
-    tests = words[1:] if words[0] == "test" else []
-    return Mutant(patch.stem, patch, head["mistake"], [] if tests else words, tests)
+    words = head["names"].removeprefix("test ").split()
+    decks = [word for word in words if word.endswith(".toml")]
+    return Mutant(patch.stem, patch, head["mistake"], decks, [word for word in words if word not in decks])
 
 
 class Copy:
@@ -79,11 +79,9 @@ class Copy:
         if status != 0:
             raise SuiteError(f"`{' '.join(map(str, command))}` failed:\n{stderr[-2000:]}")
 
-    def build(self, mutant):
-        if mutant.decks:
-            self.must(["cargo", "build", *PROFILE])
-        if mutant.tests:
-            self.must(["cargo", "test", *PROFILE, "--test", "suite", "--no-run"])
+    def build(self):
+        """The tests, and the program with them."""
+        self.must(["cargo", "test", *PROFILE, "--test", "suite", "--no-run"])
 
     def verify(self, deck):
         """How a deck fails; None where it holds."""
@@ -131,15 +129,15 @@ def shorten(text):
 def try_mutant(copy, mutant):
     copy.must(["git", "apply", mutant.patch])
     try:
-        copy.build(mutant)
+        copy.build()
         return copy.judge(mutant)
     finally:
         copy.must(["git", "apply", "--reverse", mutant.patch])
 
 
 def check_unmutated(copy, mutants):
+    copy.build()
     for mutant in mutants:
-        copy.build(mutant)
         broken = [what for what, failure in copy.judge(mutant).items() if failure]
         if broken:
             raise SuiteError(f"without any mutation {', '.join(broken)} fails already")
