@@ -1,5 +1,5 @@
 //! Runs that go on from a checkpoint end with the same results as runs that never stopped, to the
-//! last bit: all decks, each stopped at a random row.
+//! last bit: all decks, each stopped at a random row. Long runs end early, after some rows.
 
 use beamsim::deck::{Severity, Unreadable};
 use beamsim::scene::{self, Scene};
@@ -7,6 +7,9 @@ use beamsim_core::run::{Checkpoint, Counters, Failure, Observer, Run, Snapshot, 
 use beamsim_core::threads;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
+
+/// The number of rows of a run; all without limit take three minutes (`RESUME_ROWS=1000000`).
+const ROWS: usize = 100;
 
 /// All that a run shows.
 #[derive(Default)]
@@ -32,13 +35,16 @@ struct Keeper<'s> {
     offers: u64,
     /// The run was resumed: its first checkpoint is kept.
     is_resumed: bool,
+    /// The number of rows after which the run ends
+    limit: usize,
     shown: Shown,
     kept: Option<Stored>,
 }
 
 impl<'s> Keeper<'s> {
     fn new(scene: &'s Scene, seed: u64) -> Self {
-        Self { scene, seed, offers: 0, is_resumed: false, shown: Shown::default(), kept: None }
+        let limit = std::env::var("RESUME_ROWS").ok().and_then(|rows| rows.parse().ok()).unwrap_or(ROWS);
+        Self { scene, seed, offers: 0, is_resumed: false, limit, shown: Shown::default(), kept: None }
     }
 }
 
@@ -53,7 +59,7 @@ impl Observer for Keeper<'_> {
         let mut values = vec![at.stage as f64, at.state.time, at.state.load];
         self.scene.probes.iter().for_each(|probe| probe.read(at, &mut values));
         self.shown.rows.push(values.into_iter().map(f64::to_bits).collect());
-        Ok(())
+        if self.shown.rows.len() < self.limit { Ok(()) } else { Err(Failure::Io("enough rows".into())) }
     }
 
     fn found(&mut self, stage: usize, result: &StageResult) -> Result<(), Failure> {
@@ -97,7 +103,8 @@ fn difference(scene: &Scene, seed: u64) -> Option<String> {
     let stored = kept?;
     let checkpoint: Checkpoint = postcard::from_bytes(&stored.bytes).expect("it was stored whole");
     let at = checkpoint.steps();
-    let mut rest = Keeper { is_resumed: true, ..Keeper::new(scene, 0) };
+    let fresh = Keeper::new(scene, 0);
+    let mut rest = Keeper { is_resumed: true, limit: fresh.limit - stored.rows, ..fresh };
     let (ended_again, counters_again) = Run::resume(scene.plan.clone(), checkpoint, &mut rest).finish();
     let first = rest.kept.map(|kept| kept.bytes);
     let Shown { rows, results, warnings } = rest.shown;

@@ -1,8 +1,10 @@
-//! Friction where sliding turns round within adaptive steps, whose local error does not show it.
+//! Friction where sliding turns round within time steps: adaptive ones, whose local error does not show it,
+//! and fixed ones, which tell.
 
 use crate::random::Random;
 use crate::scenes::{Simulation, list, simulate};
 use beamsim_core::tensor::{Mat3, Vec3};
+use std::f64::consts::PI;
 
 const G: f64 = 9.81;
 
@@ -72,21 +74,67 @@ fn what_slides_in_adaptive_steps_stops_where_it_should() {
     }
 }
 
+/// A block on a belt that goes to and fro, at a rate.
+struct Belt {
+    block: Block,
+    rate: f64,
+    deck: String,
+}
+
+impl Belt {
+    fn random(random: &mut Random) -> Self {
+        let block = Block::random(random);
+        let rate = random.range(2.0, 5.0);
+        let way = list(block.axes * Vec3([block.units[0], 0.0, 0.0]));
+        let deck = format!(
+            "move = {way}\nhistory = {{ name = \"h\", stages = [2] }}\n[history.h]\nexpr = \"1 - cos({rate}*t)\"\n"
+        );
+        Self { block, rate, deck }
+    }
+
+    fn run(&self, settings: &str) -> Simulation {
+        simulate(&self.block.deck(&self.deck, 0.0, 3.0, settings))
+    }
+
+    fn way(&self, settings: &str) -> f64 {
+        self.block.way(&self.run(settings))
+    }
+}
+
 #[test]
 fn a_belt_that_goes_to_and_fro_takes_along_what_lies_on_it() {
     let mut random = Random::new(7);
     for _ in 0..4 {
-        let block = Block::random(&mut random);
-        let rate = random.range(2.0, 5.0);
-        let way = list(block.axes * Vec3([block.units[0], 0.0, 0.0]));
-        let belt = format!(
-            "move = {way}\nhistory = {{ name = \"h\", stages = [2] }}\n[history.h]\nexpr = \"1 - cos({rate}*t)\"\n"
-        );
-        let way = |settings: &str| block.way(&simulate(&block.deck(&belt, 0.0, 3.0, settings)));
-        let exact = way("step = 1e-3");
+        let belt = Belt::random(&mut random);
+        let exact = belt.way("step = 1e-3");
         for tolerance in [1e-3, 1e-4, 1e-5] {
-            let found = way(&format!("step = 1e-3\nadaptive = true\nstep_tolerance = {tolerance}"));
+            let found = belt.way(&format!("step = 1e-3\nadaptive = true\nstep_tolerance = {tolerance}"));
+            let rate = belt.rate;
             assert!((found - exact).abs() < 0.01 * exact.abs().max(0.1), "{rate}, {tolerance}: {found} for {exact}");
         }
     }
+}
+
+#[test]
+fn fixed_steps_tell_of_the_friction_that_they_miss() {
+    let mut random = Random::new(11);
+    let tells =
+        |run: &Simulation| run.counters.findings.warnings.iter().any(|w| w.to_string().contains("for friction"));
+    let mut untold = 0.0_f64;
+    for _ in 0..10 {
+        let belt = Belt::random(&mut random);
+        let good = belt.run("step = 1e-3");
+        assert!(!tells(&good), "{}", belt.rate);
+        let exact = belt.block.way(&good);
+        for steps in [12.0, 17.0, 25.0, 35.0, 60.0, 100.0, 200.0] {
+            let step = 2.0 * PI / belt.rate / steps;
+            let run = belt.run(&format!("step = {step:e}\nadaptive = false"));
+            let error = (belt.block.way(&run) - exact).abs() / exact.abs().max(0.5);
+            let told = tells(&run);
+            untold = if told { untold } else { untold.max(error) };
+            assert!(told || steps > 35.0, "{}, {steps} steps", belt.rate);
+            assert!(!told || steps < 200.0, "{}, {steps} steps", belt.rate);
+        }
+    }
+    assert!(untold < 0.08, "{untold}");
 }

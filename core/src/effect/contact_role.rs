@@ -170,15 +170,32 @@ pub struct RubbingPoint {
     pub(crate) force: Vec3,
     /// The sliding since the last accepted state
     pub(crate) sliding: Vec3,
-    /// The way on which the spring of stick reaches the limit of friction; `None` unless the point slides
-    pub(crate) stick_way: Option<f64>,
+    /// True if its friction is at the limit
+    pub(crate) slides: bool,
+    /// K_t, the stiffness of stick, force per length
+    pub(crate) stiffness: f64,
+    /// mu p, the limit of friction
+    pub(crate) limit: f64,
+    /// The part of the force that the point carries
+    pub(crate) weight: f64,
 }
 
 impl RubbingPoint {
-    pub(crate) fn of(place: (usize, f64), law: &FrictionLaw, state: &PointState) -> Self {
-        let limit = law.limit(state.normal_force.force);
-        let stick_way = (state.status() == Status::Slides).then_some(limit / law.stiffness);
-        Self { place, force: state.traction.force, sliding: state.traction.sliding, stick_way }
+    pub(crate) fn of(place: (usize, f64), law: &FrictionLaw, weight: f64, state: &PointState) -> Self {
+        Self {
+            place,
+            force: state.traction.force,
+            sliding: state.traction.sliding,
+            slides: state.status() == Status::Slides,
+            stiffness: law.stiffness,
+            limit: law.limit(state.normal_force.force),
+            weight,
+        }
+    }
+
+    /// The way on which the spring of stick reaches the limit of friction.
+    pub(crate) fn stick_way(&self) -> f64 {
+        self.limit / self.stiffness
     }
 
     /// The point of another state that is nearest to this one, between the same bodies.

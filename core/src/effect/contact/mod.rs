@@ -434,7 +434,8 @@ impl Contacts for SurfaceContacts {
             self.each_chain(at, Weights::NONE, &mut |number, chain| {
                 chain.each_point(Weights::NONE, &mut |point, _| {
                     let place = (number, point.candidate.along());
-                    points.extend(point.law.friction.map(|law| RubbingPoint::of(place, &law, point.state)));
+                    let of_law = |law| RubbingPoint::of(place, &law, point.law.weight, point.state);
+                    points.extend(point.law.friction.map(of_law));
                 });
             });
             self.pairs().add_rubbing(at, self.chains.len(), &mut points);

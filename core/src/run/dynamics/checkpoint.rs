@@ -1,6 +1,7 @@
 //! A dynamic stage as part of a checkpoint.
 
 use super::adaptive::Control;
+use super::friction::FrictionImpulses;
 use crate::integrate::Predictor;
 use crate::run::energy::EnergyGuard;
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,8 @@ pub(in crate::run) struct DynamicsCheckpoint {
     pub(super) massive: Vec<bool>,
     pub(super) rateless: Vec<usize>,
     pub(super) guard: Option<EnergyGuard>,
+    /// The friction of fixed steps
+    pub(super) friction: FrictionImpulses,
     pub(super) steps: StepsCheckpoint,
 }
 

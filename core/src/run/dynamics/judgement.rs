@@ -23,6 +23,8 @@ const TOLD_ANGLE_BESIDE_MOTION: f64 = PI;
 const TOLD_ANGLE_ALONE: f64 = 0.3;
 /// The largest motion, over the length of the scene, that is none.
 const STANDING_STILL: f64 = 1e-6;
+/// The part of friction missed within steps that is told.
+const TOLD_FRICTION: f64 = 0.01;
 /// The error that a step is proposed for, over the one that is told.
 const PROPOSED_ERROR: f64 = 0.4;
 /// The least part of a step that is proposed where another scheme does with the step as it is.
@@ -140,6 +142,21 @@ impl Dynamics<'_, '_> {
             self.stage.number + 1
         );
         self.stage.warn(WarningKind::LongSteps, message);
+    }
+
+    /// Fixed steps within which friction changes too much.
+    pub(super) fn judge_friction(&mut self) {
+        let missed = self.friction.missed_part();
+        if missed > TOLD_FRICTION {
+            let shorter = round_down(self.settings.step * PROPOSED_ERROR * TOLD_FRICTION / missed);
+            let message = format!(
+                "stage {}: the time steps are too long for friction, which changes within them where sliding begins, ends \
+                 or turns round: {} of its impulse is missed (try `step = {shorter}`, or `adaptive = true`)",
+                self.stage.number + 1,
+                percent(missed)
+            );
+            self.stage.warn(WarningKind::LongSteps, message);
+        }
     }
 
     /// Steps or a scheme that err less.

@@ -2,17 +2,18 @@
 
 mod adaptive;
 pub(super) mod checkpoint;
+mod friction;
 mod grid;
 mod judgement;
 mod massless;
 mod middle;
-mod reversal;
 mod smooth_start;
 mod start;
 mod two_stages;
 
 use self::adaptive::Control;
 use self::checkpoint::{DynamicsCheckpoint, StepsCheckpoint};
+use self::friction::FrictionImpulses;
 use self::grid::Grid;
 use self::middle::Middle;
 use super::checkpoint::AnalysisCheckpoint;
@@ -59,6 +60,8 @@ pub(super) struct Dynamics<'s, 'r> {
     /// Watches the energy of time steps; not in linear stages, whose account takes as long as their
     /// steps.
     guard: Option<EnergyGuard>,
+    /// The friction of fixed steps
+    friction: FrictionImpulses,
 }
 
 impl<'s, 'r> Dynamics<'s, 'r> {
@@ -77,6 +80,7 @@ impl<'s, 'r> Dynamics<'s, 'r> {
             massive: Vec::new(),
             rateless: Vec::new(),
             guard,
+            friction: FrictionImpulses::default(),
             stage,
         }
     }
@@ -112,6 +116,7 @@ impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
         self.stage.warn_of_soft_stick();
         self.stage.warn_of_layers();
         self.judge_steps();
+        self.judge_friction();
     }
 }
 
@@ -135,8 +140,10 @@ impl Dynamics<'_, '_> {
 
     /// Takes up the stage where a checkpoint has left it.
     fn take_up(&mut self, checkpoint: DynamicsCheckpoint) -> StepsCheckpoint {
-        let DynamicsCheckpoint { last_length, predictor, of_middle, massive, rateless, guard, steps } = checkpoint;
-        (self.last_length, self.massive, self.rateless, self.guard) = (last_length, massive, rateless, guard);
+        let DynamicsCheckpoint { last_length, predictor, of_middle, massive, rateless, guard, friction, steps } =
+            checkpoint;
+        (self.last_length, self.massive, self.rateless) = (last_length, massive, rateless);
+        (self.guard, self.friction) = (guard, friction);
         self.predictor = predictor.of_model(self.stage.model);
         if let (Some(middle), Some(predictor)) = (&mut self.middle, of_middle) {
             middle.predictor = predictor.of_model(self.stage.model);
@@ -158,7 +165,7 @@ impl Dynamics<'_, '_> {
 
     /// Shows the observer where the stage is, if it wants that.
     fn offer_checkpoint(&mut self, steps: impl FnOnce() -> StepsCheckpoint) -> Result<(), Failure> {
-        let Self { stage, last_length, predictor, middle, massive, rateless, guard, .. } = self;
+        let Self { stage, last_length, predictor, middle, massive, rateless, guard, friction, .. } = self;
         stage.offer_checkpoint(|| {
             AnalysisCheckpoint::Dynamics(DynamicsCheckpoint {
                 last_length: *last_length,
@@ -167,6 +174,7 @@ impl Dynamics<'_, '_> {
                 massive: massive.clone(),
                 rateless: rateless.clone(),
                 guard: guard.clone(),
+                friction: *friction,
                 steps: steps(),
             })
         })
@@ -221,6 +229,7 @@ impl Dynamics<'_, '_> {
             self.tell_time(target)?;
             match self.advance(step, target) {
                 Ok(()) => {
+                    self.add_friction(step.length);
                     self.restore_rates()?;
                     self.last_length = step.length;
                     parts -= 1;

@@ -124,7 +124,8 @@ impl PairRole<'_> {
             self.now(at).each_point(Weights::NONE, &mut |point, _| {
                 let [on_first, _] = point.pair.elements;
                 let place = (first + point.pair.meeting as usize, f64::from(on_first) + point.candidate.at[0]);
-                points.extend(point.law.friction.map(|law| RubbingPoint::of(place, &law, &point.state)));
+                let of_law = |law| RubbingPoint::of(place, &law, point.law.weight, &point.state);
+                points.extend(point.law.friction.map(of_law));
             });
         }
     }
