@@ -8,8 +8,8 @@ use beamsim_core::threads;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-/// The number of rows of a run; all without limit take three minutes (`RESUME_ROWS=1000000`).
-const ROWS: usize = 100;
+/// The number of rows of a run. Without a limit (`RESUME_ROWS=1000000`) all runs take some minutes.
+const ROWS: usize = 30;
 
 /// All that a run shows.
 #[derive(Default)]

@@ -65,6 +65,9 @@ const GROUP_SIZE: usize = 4;
 const LONG_PROJECTION: usize = 100;
 /// Relative change of eigenvalues between two projections at which they have converged
 const EIGENVALUE_TOLERANCE: f64 = 1e-11;
+/// Changes below this part of the largest eigenvalue are round-off: next to a critical load its eigenvalue is 1e8 times
+/// as large as the others, which know half of their digits
+const ROUND_OFF_OF_LARGEST: f64 = 1e-14;
 /// Relative change between two projections at which positive eigenvalues have converged that are looked for first: they
 /// may be far from the largest, and are estimates
 const ONE_SIDED_TOLERANCE: f64 = 1e-8;
@@ -206,7 +209,9 @@ fn converged_space(
         look = space.applied() + space.applied() / 4;
         let mut now = space.eigenvalues(operator.is_symmetric(), first)?;
         now.truncate(guard);
-        let same = |&(a, b): &(&Complex<f64>, &Complex<f64>)| (a - b).norm() <= tolerance * a.norm();
+        let largest = now.iter().map(|theta| theta.norm()).fold(0.0, f64::max);
+        let allowed = |theta: &Complex<f64>| (tolerance * theta.norm()).max(ROUND_OFF_OF_LARGEST * largest);
+        let same = |&(a, b): &(&Complex<f64>, &Complex<f64>)| (a - b).norm() <= allowed(a);
         let converged = now.iter().zip(&last).take_while(same).count();
         let is_all = converged == now.len().max(last.len()) && converged >= wanted.min(operator.size());
         if is_all || !grows {

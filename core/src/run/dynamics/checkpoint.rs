@@ -1,7 +1,7 @@
 //! A dynamic stage as part of a checkpoint.
 
 use super::adaptive::Control;
-use super::friction::FrictionImpulses;
+use super::friction_impulses::FrictionImpulses;
 use crate::integrate::Predictor;
 use crate::run::energy::EnergyGuard;
 use serde::{Deserialize, Serialize};

@@ -4,40 +4,16 @@
 //! do not show what that misses: adaptive steps refuse such steps, and for fixed steps it is summed up.
 
 use super::Dynamics;
+use super::friction_impulses::FrictionImpulses;
 use super::smooth_start::advance;
 use crate::effect::{Contacts, RubbingPoint};
 use crate::system::State;
-use crate::tensor::Vec3;
-use serde::{Deserialize, Serialize};
 
 /// The way back within a step that is allowed, over the way on which friction builds up.
 const MAX_WAY_BACK: f64 = 0.1;
 
 /// The part of a step by which a state is moved on to see the velocity of sliding.
 const VELOCITY_STEP: f64 = 1e-3;
-
-/// The parts in which friction follows the motion of a step.
-const PARTS: usize = 64;
-
-/// Sums over the points of contact and the steps of a stage: force times time.
-#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize)]
-pub(super) struct FrictionImpulses {
-    /// What the mean of the friction at both ends of a step misses of the mean over the step
-    missed: f64,
-    /// The mean of the friction at both ends
-    all: f64,
-}
-
-impl FrictionImpulses {
-    fn with(self, other: Self) -> Self {
-        Self { missed: self.missed + other.missed, all: self.all + other.all }
-    }
-
-    /// The part of friction that is missed.
-    pub(super) fn missed_part(self) -> f64 {
-        if self.all > 0.0 { self.missed / self.all } else { 0.0 }
-    }
-}
 
 impl Dynamics<'_, '_> {
     /// True if a point of contact has slid back within the step of some length that has just been solved,
@@ -80,10 +56,7 @@ impl Dynamics<'_, '_> {
                 Some((end.nearest_of(ahead)?.sliding - now.sliding) * (1.0 / VELOCITY_STEP))
             };
             let rates = [rate(start, &ahead[0])?, rate(end, &ahead[1])?];
-            let seen = (start.force + end.force) * 0.5;
-            let missed = mean_friction(start, end, rates) - seen;
-            let impulse = length * end.weight;
-            Some(FrictionImpulses { missed: impulse * missed.norm(), all: impulse * seen.norm() })
+            Some(FrictionImpulses::of_point(start, end, rates, length))
         };
         let sum = ends[1].iter().filter_map(of_point).fold(FrictionImpulses::default(), FrictionImpulses::with);
         self.friction = self.friction.with(sum);
@@ -101,26 +74,4 @@ impl Dynamics<'_, '_> {
         let _ = self.stage.schedule.set_clock(self.stage.model, &mut moved, from.time + time, 1.0);
         moved
     }
-}
-
-/// The mean of the friction of a point over a step. The point slides along a cubic with its way and
-/// its velocities (over the step) at both ends, and the limit of friction changes in proportion to time.
-fn mean_friction(start: &RubbingPoint, end: &RubbingPoint, [from, to]: [Vec3; 2]) -> Vec3 {
-    let way = |part: f64| {
-        let rest = 1.0 - part;
-        end.sliding * (part * part * (3.0 - 2.0 * part)) + (from * rest - to * part) * (part * rest)
-    };
-    let mut force = start.force;
-    let mut sum = Vec3::ZERO;
-    for k in 0..PARTS {
-        let [before, now] = [k, k + 1].map(|k| k as f64 / PARTS as f64);
-        force -= (way(now) - way(before)) * end.stiffness;
-        let limit = start.limit + (end.limit - start.limit) * now;
-        let size = force.norm();
-        if size > limit {
-            force = force * (limit / size);
-        }
-        sum += force;
-    }
-    sum * (1.0 / PARTS as f64)
 }

@@ -3,6 +3,7 @@
 mod adaptive;
 pub(super) mod checkpoint;
 mod friction;
+mod friction_impulses;
 mod grid;
 mod judgement;
 mod massless;
@@ -13,7 +14,7 @@ mod two_stages;
 
 use self::adaptive::Control;
 use self::checkpoint::{DynamicsCheckpoint, StepsCheckpoint};
-use self::friction::FrictionImpulses;
+use self::friction_impulses::FrictionImpulses;
 use self::grid::Grid;
 use self::middle::Middle;
 use super::checkpoint::AnalysisCheckpoint;
