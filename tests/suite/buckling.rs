@@ -1,7 +1,7 @@
 //! Critical loads on the paths of buckling stages: one row for each point.
 
 use crate::random::Random;
-use crate::scenes::{list, results};
+use crate::scenes::{list, results, simulate};
 use beamsim_core::run::{CriticalKind, CriticalLoad, StageResult};
 use beamsim_core::tensor::Vec3;
 use std::fs;
@@ -418,6 +418,35 @@ fn loads_above_the_present_one_are_found_beside_nearer_ones_below() {
             for (found, exact) in found.iter().zip(exact) {
                 assert!((found.load / exact - 1.0).abs() < 1e-3, "{tie}: {found:?} for {exact}");
             }
+        }
+    }
+}
+
+/// What moves goes on moving behind a stage that looks for critical loads or modes, in any chart.
+#[test]
+fn motions_go_on_behind_an_analysis_of_the_present_state() {
+    let stages = |between: &str, cut: f64| {
+        let dynamic = |end: f64| format!("[[stage]]\nkind = \"dynamic\"\nend = {end}\nstep = 0.002\n");
+        let last = simulate(&format!(
+            "[point]\na = [0, 0, 0]\nb = [0, 0, 1]\nc = [5, 0, 0]\n[section.s]\nEA = 200\nGA = 200\nGJ = 20\n\
+             EI = [10, 20]\nrhoA = 1\n[[beam]]\nname = \"c\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 3\n\
+             [[body]]\nat = \"c\"\nmass = 1\ninertia = [1, 2, 3]\n\
+             [[spring]]\nat = \"c\"\nstiffness = [50, 60, 70, 1, 1, 1]\n[[support]]\nat = \"a\"\nfix = \"all\"\n[[load]]\nat = \"b\"\nforce = [0, 0, -10]\n\
+             [[initial]]\nat = \"b\"\nvelocity = [0.5, 0, 0]\n\
+             [[initial]]\nat = \"c\"\nspin = [0, 0, 20]\nabout = \"c\"\n\
+             {}{between}{}[output]\nnodes = [\"b\", \"c\"]\ncolumns = [\"u\", \"v\", \"w\"]\n",
+            dynamic(cut),
+            dynamic(0.4)
+        ));
+        last.rows[last.rows.len() - 1].clone()
+    };
+    // The body passes half a turn, and then that by which its chart lags behind, at 0.157 and more.
+    for cut in [0.1, 0.156, 0.16, 0.17, 0.18, 0.19, 0.2, 0.22] {
+        let exact = stages("", cut);
+        for between in ["buckling", "modal"] {
+            let found = stages(&format!("[[stage]]\nkind = \"{between}\"\nmodes = 1\n"), cut);
+            let off = exact.iter().zip(&found).map(|(a, b)| (a - b).abs() / (1.0 + a.abs())).fold(0.0, f64::max);
+            assert!(off < 1e-9, "{between} at {cut}: {off}, {found:?} for {exact:?}");
         }
     }
 }

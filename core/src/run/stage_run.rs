@@ -451,6 +451,15 @@ impl StageRun<'_> {
         switched
     }
 
+    /// Brings what moves to rest, for an analysis of the present state. With the rates of the state that is
+    /// returned it moves on; they are those of the present charts.
+    pub fn stand_still(&mut self) -> State {
+        self.change_charts(None);
+        let moving = self.state.clone();
+        self.state.stand_still();
+        moving
+    }
+
     /// Counts what the effects of an assembly have evaluated.
     pub fn count_evaluations(&mut self, assembly: &Assembly) {
         count_evaluations(self.counters, assembly);

@@ -184,7 +184,7 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
 
     /// Finds the critical loads nearest above the present one, then those below it.
     fn run(&mut self) -> Result<(), Failure> {
-        self.stand_still()?;
+        let moving = self.stand_still()?;
         let load = self.stage.state.load;
         let loads = critical_loads(self.stage, self.modes)?;
         if loads.is_empty() {
@@ -200,19 +200,20 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         self.stage.counters.work.uncertainty = uncertainty;
         sort_by(&mut found, |a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
         self.stage.counters.steps += 1;
+        // What moved moves on.
+        self.stage.state.copy_rates(&moving);
         self.stage.give(&StageResult::CriticalLoads(found))
     }
 
-    fn judge(&mut self) {
-        self.stage.warn_of_standstill();
-    }
+    /// Nothing is off: motions go on behind a buckling stage.
+    fn judge(&mut self) {}
 }
 
 impl Buckling<'_, '_> {
     /// Paths are followed from rest.
-    fn stand_still(&mut self) -> Result<(), Failure> {
+    fn stand_still(&mut self) -> Result<State, Failure> {
+        let moving = self.stage.stand_still();
         let StageRun { model, state, fresh, schedule, .. } = &mut *self.stage;
-        state.stand_still();
         if *fresh {
             state.load = 0.0;
         }
@@ -220,10 +221,9 @@ impl Buckling<'_, '_> {
         let held = state.q.clone();
         schedule.set_clock(model, state, time, load);
         state.q = held;
-        self.stage.change_charts(None);
         self.stage.open_account()?;
         self.stage.warn_out_of_balance();
-        Ok(())
+        Ok(moving)
     }
 
     /// The critical loads on one side of the present one that look from the start like these, up to a limit point

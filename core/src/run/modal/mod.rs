@@ -14,6 +14,7 @@ use super::stage_run::{Analysis, StageRun, Teller};
 use crate::model::StageError;
 use crate::solve::{Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, mechanism};
 use crate::sorting::sort_by;
+use crate::system::State;
 use crate::tensor::Vec3;
 use crate::warning::WarningKind;
 use nalgebra::Complex;
@@ -41,9 +42,8 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
     /// Finds the modes with the smallest |s|, and all unstable ones.
     fn run(&mut self) -> Result<(), Failure> {
         self.stage.tell_progress(0.0)?;
-        let moving = self.stage.state.clone();
         let spin = self.fastest_spin();
-        self.stand_still()?;
+        let moving = self.stand_still()?;
         let matrices = self.matrices()?;
         let found = self.find(&matrices)?;
         let mut listed = listed(&found, self.modes);
@@ -70,15 +70,14 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
 
 impl Modal<'_, '_> {
     /// Modes are those of the state at rest.
-    fn stand_still(&mut self) -> Result<(), Failure> {
+    fn stand_still(&mut self) -> Result<State, Failure> {
+        let moving = self.stage.stand_still();
         let StageRun { model, state, schedule, .. } = &mut *self.stage;
-        state.stand_still();
         let (time, load) = (state.time, state.load);
         schedule.set_clock(model, state, time, load);
-        self.stage.change_charts(None);
         self.stage.open_account()?;
         self.stage.warn_out_of_balance();
-        Ok(())
+        Ok(moving)
     }
 
     /// The fastest rotation of a node, rad per time.
