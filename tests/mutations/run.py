@@ -5,9 +5,9 @@ patch names, decks (by `beamsim verify`) or a test (by `cargo test`), then fails
     tests/mutations/run.py [NAME ...] [--table FILE] [--target FOLDER] [--timeout SECONDS]
     tests/mutations/run.py --applies
 
-A patch begins with lines `# mistake:`, `# names:` (decks, or `test` and tests `module::name` and decks), `# why:`. A mutant that does not
-apply or build is an error, not a success; `--applies` only looks whether each one applies. Exit status: 0 all found,
-1 a mutant survives, 2 an error of the suite.
+A patch begins with lines `# mistake:`, `# names:` (decks and tests `module::name`), `# why:`. A mutant that does not
+apply or build is an error, not a success; `--applies` only looks whether each one applies and names what is there.
+Exit status: 0 all found, 1 a mutant survives, 2 an error of the suite.
 Builds are incremental and without optimisation; where one has been killed and the next does not link, remove the
 target folder.
 """
@@ -46,7 +46,7 @@ def read(patch):
     head = dict(re.findall(r"^# (mistake|names|why): (.+)$", text, re.M))
     if len(head) != 3:
         raise SuiteError(f"{patch.name}: needs `# mistake:`, `# names:` and `# why:`")
-    words = head["names"].removeprefix("test ").split()
+    words = head["names"].split()
     decks = [word for word in words if word.endswith(".toml")]
     return Mutant(patch.stem, patch, head["mistake"], decks, [word for word in words if word not in decks])
 
@@ -150,7 +150,7 @@ def row(mutant, results):
 
 
 def applies(mutants):
-    """Fails on patches that do not fit the sources any more, and on decks that are not there."""
+    """Fails on patches that do not fit the sources any more, and on decks and tests that are not there."""
     with tempfile.TemporaryDirectory(prefix="beamsim-mutations-") as folder:
         copy = Copy(Path(folder).resolve(), ROOT / "target" / "mutations", 0.0)
         for mutant in mutants:
@@ -158,6 +158,10 @@ def applies(mutants):
             for deck in mutant.decks:
                 if not (copy.folder / deck).is_file():
                     raise SuiteError(f"{mutant.name}: there is no {deck}")
+            for test in mutant.tests:
+                module, name = test.split("::")
+                if f"fn {name}(" not in (copy.folder / "tests" / "suite" / f"{module}.rs").read_text():
+                    raise SuiteError(f"{mutant.name}: there is no test {test}")
     print(f"{len(mutants)} patches apply")
     return 0
 

@@ -85,7 +85,7 @@ fn runs_cost_the_recorded_counts() {
     assert!(changed.is_empty() && now.len() == before.len(), "other counts than recorded: {changed:#?}");
 }
 
-/// One short run of those above, for builds without optimisation.
+/// One short run of those above: all take half an hour without optimisation.
 #[test]
 fn a_path_by_arc_length_costs_the_recorded_counts() {
     let before = recorded(&root().join("tests/counters.csv"));

@@ -131,7 +131,7 @@ impl StepEnds<'_> {
     }
 
     /// The states of the step, each with the weight of its force in the impulse that the step takes.
-    fn instants(&self) -> Vec<(f64, &State)> {
+    pub fn instants(&self) -> Vec<(f64, &State)> {
         let Self { from, middle, to } = *self;
         match middle {
             None => vec![(0.5, from), (0.5, to)],

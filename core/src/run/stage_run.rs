@@ -451,8 +451,8 @@ impl StageRun<'_> {
         switched
     }
 
-    /// Brings what moves to rest, for an analysis of the present state. With the rates of the state that is
-    /// returned it moves on; they are those of the present charts.
+    /// Brings what moves to rest, for an analysis of the present state. Returns the state as it moved, in the
+    /// charts of the analysis: with its rates the motion goes on.
     pub fn stand_still(&mut self) -> State {
         self.change_charts(None);
         let moving = self.state.clone();

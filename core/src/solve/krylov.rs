@@ -65,8 +65,8 @@ const GROUP_SIZE: usize = 4;
 const LONG_PROJECTION: usize = 100;
 /// Relative change of eigenvalues between two projections at which they have converged
 const EIGENVALUE_TOLERANCE: f64 = 1e-11;
-/// Changes below this part of the largest eigenvalue are round-off: next to a critical load its eigenvalue is 1e8 times
-/// as large as the others, which know half of their digits
+/// Changes of eigenvalues below this part of the largest are round-off. Next to a critical load the largest is 1e8 times
+/// as large as the others, of which half of the digits are right.
 const ROUND_OFF_OF_LARGEST: f64 = 1e-14;
 /// Relative change between two projections at which positive eigenvalues have converged that are looked for first: they
 /// may be far from the largest, and are estimates
@@ -634,4 +634,48 @@ fn take_out(others: &[Vec<Complex<f64>>], x: &mut [Complex<f64>]) {
 
 fn largest_first(a: &Complex<f64>, b: &Complex<f64>) -> std::cmp::Ordering {
     b.norm().total_cmp(&a.norm()).then(b.im.total_cmp(&a.im))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A diagonal matrix, which counts its images.
+    struct Diagonal {
+        values: Vec<f64>,
+        images: usize,
+    }
+
+    impl Operator for Diagonal {
+        fn size(&self) -> usize {
+            self.values.len()
+        }
+
+        fn apply(&mut self, x: &[f64], _weighed: &[f64]) -> Option<Vec<f64>> {
+            self.images += 1;
+            Some(x.iter().zip(&self.values).map(|(x, value)| x * value).collect())
+        }
+
+        fn weigh(&mut self, x: &[f64]) -> Vec<f64> {
+            x.to_vec()
+        }
+
+        fn is_symmetric(&self) -> bool {
+            true
+        }
+    }
+
+    /// As next to a critical load of a column: its eigenvalue is far larger than the others.
+    #[test]
+    fn eigenvalues_far_below_the_largest_converge_to_its_round_off() {
+        for largest in [10.0, 1e4, 1e8, 1e9] {
+            let others = (0..600).map(|k| f64::from(k / 2 + 1).powi(-2));
+            let mut operator = Diagonal { values: [largest; 2].into_iter().chain(others).collect(), images: 0 };
+            let found = leading_eigenvalues_until(&mut operator, 24, First::Largest, &|found| found.len() > 4).unwrap();
+            for (found, exact) in found.iter().zip(operator.values.clone()) {
+                assert!((found - exact).norm() < 1e-10 * exact + 1e-14 * largest, "{largest}: {found} for {exact}");
+            }
+            assert!(operator.images < 150, "{largest}: {} images", operator.images);
+        }
+    }
 }

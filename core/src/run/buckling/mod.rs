@@ -210,7 +210,7 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
 }
 
 impl Buckling<'_, '_> {
-    /// Paths are followed from rest.
+    /// Paths are followed from rest. Returns the state with its rates.
     fn stand_still(&mut self) -> Result<State, Failure> {
         let moving = self.stage.stand_still();
         let StageRun { model, state, fresh, schedule, .. } = &mut *self.stage;

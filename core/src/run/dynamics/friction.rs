@@ -1,6 +1,6 @@
 //! Friction that changes within a time step: what slides comes to rest, sticks or slides back.
 //!
-//! Friction at the end of a step acts along the whole motion of the step. Accelerations at both ends
+//! Friction at the end of a step acts along the whole motion of the step, and accelerations at both ends
 //! do not show what that misses: adaptive steps refuse such steps, and for fixed steps it is summed up.
 
 use super::Dynamics;
@@ -8,6 +8,7 @@ use super::friction_impulses::FrictionImpulses;
 use super::smooth_start::advance;
 use crate::effect::{Contacts, RubbingPoint};
 use crate::system::State;
+use crate::tensor::Vec3;
 
 /// The way back within a step that is allowed, over the way on which friction builds up.
 const MAX_WAY_BACK: f64 = 0.1;
@@ -41,24 +42,28 @@ impl Dynamics<'_, '_> {
         sliding.filter_map(way_back).any(|(back, stick_way)| back > allowed.max(MAX_WAY_BACK * stick_way))
     }
 
-    /// Adds the friction of the step of some length that has just been solved.
+    /// Adds the friction of the step of some length that has just been solved to that of the stage.
     pub(super) fn add_friction(&mut self, length: f64) {
         let Some(contacts) = self.rubbing_contacts() else { return };
-        let states: [&State; 2] = [self.stage.good, self.stage.state];
-        let ends = states.map(|at| contacts.rubbing(at));
-        if !ends.iter().flatten().any(|point| point.slides) {
+        let ends = self.step_ends();
+        let instants: Vec<(f64, Vec<RubbingPoint>)> =
+            ends.instants().into_iter().map(|(weight, at)| (weight, contacts.rubbing(at))).collect();
+        let (Some((_, at_start)), Some((_, at_end))) = (instants.first(), instants.last()) else { return };
+        if !at_start.iter().chain(at_end).any(|point| point.slides) {
             return;
         }
-        let ahead = states.map(|at| contacts.rubbing(&self.moved(at, VELOCITY_STEP * length)));
+        let ahead = [ends.from, ends.to].map(|at| contacts.rubbing(&self.moved(at, VELOCITY_STEP * length)));
         let of_point = |end: &RubbingPoint| -> Option<FrictionImpulses> {
-            let start = end.nearest_of(&ends[0])?;
+            let start = end.nearest_of(at_start)?;
             let rate = |now: &RubbingPoint, ahead: &[RubbingPoint]| {
                 Some((end.nearest_of(ahead)?.sliding - now.sliding) * (1.0 / VELOCITY_STEP))
             };
             let rates = [rate(start, &ahead[0])?, rate(end, &ahead[1])?];
-            Some(FrictionImpulses::of_point(start, end, rates, length))
+            let force = |(weight, points): &(f64, Vec<RubbingPoint>)| Some(end.nearest_of(points)?.force * *weight);
+            let seen = instants.iter().map(force).try_fold(Vec3::ZERO, |sum, force| Some(sum + force?))?;
+            Some(FrictionImpulses::of_point(start, end, rates, seen, length))
         };
-        let sum = ends[1].iter().filter_map(of_point).fold(FrictionImpulses::default(), FrictionImpulses::with);
+        let sum = at_end.iter().filter_map(of_point).fold(FrictionImpulses::default(), FrictionImpulses::with);
         self.friction = self.friction.with(sum);
     }
 

@@ -10,16 +10,22 @@ const PARTS: usize = 64;
 /// Sums over the points of contact and the steps of a stage: force times time.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Serialize)]
 pub(super) struct FrictionImpulses {
-    /// What the mean of the friction at both ends of a step misses of the mean over the step
+    /// What the mean of the friction that steps take misses of the mean along their motion
     missed: f64,
-    /// The mean of the friction at both ends
+    /// The mean of the friction that steps take
     all: f64,
 }
 
 impl FrictionImpulses {
-    /// Those of a point in a step of some length, with its sliding in it at the velocities of both ends.
-    pub(super) fn of_point(start: &RubbingPoint, end: &RubbingPoint, rates: [Vec3; 2], length: f64) -> Self {
-        let seen = (start.force + end.force) * 0.5;
+    /// Those of a point in a step of some length, with the sliding in a step at the velocities of both ends, and
+    /// the mean friction that the step takes.
+    pub(super) fn of_point(
+        start: &RubbingPoint,
+        end: &RubbingPoint,
+        rates: [Vec3; 2],
+        seen: Vec3,
+        length: f64,
+    ) -> Self {
         let missed = mean_friction(start, end, rates) - seen;
         let impulse = length * end.weight;
         Self { missed: impulse * missed.norm(), all: impulse * seen.norm() }

@@ -23,7 +23,8 @@ const TOLD_ANGLE_BESIDE_MOTION: f64 = PI;
 const TOLD_ANGLE_ALONE: f64 = 0.3;
 /// The largest motion, over the length of the scene, that is none.
 const STANDING_STILL: f64 = 1e-6;
-/// The part of friction missed within steps that is told.
+/// The part of the impulse of friction missed within steps that is told: of blocks on random belts those below
+/// it are up to 8 % off.
 const TOLD_FRICTION: f64 = 0.01;
 /// The error that a step is proposed for, over the one that is told.
 const PROPOSED_ERROR: f64 = 0.4;

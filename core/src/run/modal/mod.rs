@@ -69,7 +69,7 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
 }
 
 impl Modal<'_, '_> {
-    /// Modes are those of the state at rest.
+    /// Modes are those of the state at rest. Returns the state with its rates.
     fn stand_still(&mut self) -> Result<State, Failure> {
         let moving = self.stage.stand_still();
         let StageRun { model, state, schedule, .. } = &mut *self.stage;
