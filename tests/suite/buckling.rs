@@ -441,7 +441,7 @@ fn motions_go_on_behind_an_analysis_of_the_present_state() {
         ));
         last.rows[last.rows.len() - 1].clone()
     };
-    // The body has passed half a turn at 0.158, where it is to change its chart.
+    // The body passes half a turn, and changes its chart, between 0.156 and 0.158.
     for cut in [0.1, 0.154, 0.156, 0.158, 0.16, 0.2] {
         let exact = stages("", cut);
         for between in ["buckling", "modal"] {
