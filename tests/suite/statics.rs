@@ -1,7 +1,9 @@
 //! The policy of static stages: it comes to the right branch whatever the number of load levels, and says what it did.
 
-use crate::scenes::{attempt, simulate};
+use crate::random::Random;
+use crate::scenes::{attempt, list, simulate};
 use beamsim_core::run::{EventKind, Failure};
+use std::f64::consts::TAU;
 
 /// Lee's frame (two-node mesh of twenty elements a leg) under P = 2, beyond its first limit.
 fn lee(stage: &str) -> String {
@@ -360,4 +362,46 @@ fn arc_length_accepts_residuals_of_round_off() {
          [output]\nnodes = [\"a\"]\ncolumns = [\"r\"]\n",
     );
     assert!((run.end("a.ry").sin() - 0.08 * 0.08).abs() < 1e-7, "{}", run.end("a.ry"));
+}
+
+/// Shallow stars of bars (springs) under a force at the apex, by arc length, as far as 3000 times the force that they snap
+/// through under. With n bars of stiffness k and length l0, feet at the distance r, at the height z:
+/// F = n k (l0/l - 1) z, l = sqrt(r^2 + z^2), with its limits where l^3 = l0 r^2. In random units and directions.
+#[test]
+fn arc_length_does_not_pass_over_a_structure_that_snaps_through() {
+    let random = &mut Random::new(77);
+    for _ in 0..300 {
+        let [length, force] = [0, 0].map(|_| 10.0_f64.powf(random.range(-3.0, 3.0)));
+        let [up, aside] = random.axes();
+        let (bars, height) = (random.range(3.0, 6.99).floor(), random.range(0.15, 0.5));
+        let (beyond, steps) = (10.0_f64.powf(random.range(0.2, 3.5)), random.range(5.0, 200.0) as u32);
+        let original = 1.0_f64.hypot(height);
+        let at_limit = original.cbrt();
+        let limit = bars * (original / at_limit - 1.0) * (at_limit * at_limit - 1.0).sqrt();
+        let mut deck = format!(
+            "[point]\ntop = {}\n[[body]]\nat = \"top\"\nmass = 1.0\n[[load]]\nat = \"top\"\nforce = {}\n",
+            list(up * (height * length)),
+            list(up * (-beyond * limit * force)),
+        );
+        for bar in 0..bars as usize {
+            let (sin, cos) = (TAU * bar as f64 / bars).sin_cos();
+            let foot = aside * (cos * length) + up.cross(aside) * (sin * length);
+            deck = format!("[point]\nfoot{bar} = {}\n{}", list(foot), deck.replacen("[point]\n", "", 1));
+            deck += &format!(
+                "[[body]]\nat = \"foot{bar}\"\nmass = 1.0\n[[support]]\nat = \"foot{bar}\"\nfix = \"all\"\n\
+                 [[spring]]\nbetween = [\"top\", \"foot{bar}\"]\nstiffness = {:e}\n",
+                force / length
+            );
+        }
+        deck += &format!(
+            "[[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = {steps}\n[output]\nnodes = [\"top\"]\n"
+        );
+        let run = simulate(&deck);
+        let events = run.counters.findings.events.iter();
+        let limits: Vec<f64> = events.filter(|e| e.kind == EventKind::Limit).map(|e| e.at.load * beyond).collect();
+        assert!(
+            limits.len() == 2 && (limits[0] - 1.0).abs() < 1e-6 && (limits[1] + 1.0).abs() < 1e-6,
+            "{bars} bars of height {height}, {beyond} times the limit in {steps} increments: {limits:?}"
+        );
+    }
 }

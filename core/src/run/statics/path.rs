@@ -38,6 +38,9 @@ const SHORTEST: f64 = 1.0 / 16384.0;
 /// The cosine between tangents, or between a tangent and its chord, below which a step was too
 /// long: it may have come down on another branch.
 const MIN_COSINE: f64 = 0.8;
+/// The same for a step from a point where nothing tells yet how the path bends: a longer one may pass
+/// over the whole way on which a structure snaps through.
+const MIN_COSINE_OF_FIRST: f64 = 0.95;
 /// The longest step that follows the bend of the path, over the one that the bend was taken from.
 const LONGEST_OF_BEND: f64 = 4.0;
 /// The shortest step that a bend is taken from, over the one of the bend before it: tangents that lie
@@ -220,7 +223,7 @@ impl Path {
                     };
                     let cosine = dot(stage, &next.tangent, &self.here.tangent) * self.scale
                         + next.load_rate * self.here.load_rate;
-                    let straight = cosine.min(length / self.chord(stage, &next)) >= MIN_COSINE;
+                    let straight = cosine.min(length / self.chord(stage, &next)) >= self.least_cosine();
                     let fine = straight && (is_believed || !self.may_have_jumped(&next));
                     if fine || length <= SHORTEST * self.first {
                         let by_iterations = (EASY / iterations.max(1) as f64).sqrt();
@@ -252,6 +255,11 @@ impl Path {
     /// True if a motion is not longer than the next step.
     pub fn is_within_a_step(&self, stage: &StageRun, moved: &[Vec3]) -> bool {
         squared(stage, moved) * self.scale <= self.length * self.length
+    }
+
+    /// The least cosine between the tangents at the ends of a step, and between a tangent and its chord.
+    fn least_cosine(&self) -> f64 {
+        if self.here.bend.is_some() { MIN_COSINE } else { MIN_COSINE_OF_FIRST }
     }
 
     /// The longest step where the path is straight: it brings as much load as the longest one at
