@@ -154,8 +154,10 @@ const MOST_ITERATIONS: usize = 10_000;
 const ENERGY_LIMIT: f64 = 0.2;
 /// Default of `step_tolerance`.
 pub const STEP_TOLERANCE: f64 = 1e-4;
-/// Default of `max_steps`, as a multiple of `steps`.
+/// Default of `max_steps`, as a multiple of `steps`, at least.
 const INCREMENTS_PER_STEP: usize = 10;
+/// The least default of `max_steps`: the first increments may be short.
+const LEAST_INCREMENTS: usize = 200;
 
 const COMMON_KEYS: [&str; 5] = ["kind", "tolerance", "max_iterations", "until", "frame"];
 const STATIC_KEYS: [&str; 3] = ["steps", "control", "max_steps"];
@@ -244,7 +246,7 @@ fn read_static(table: &Table) -> Option<StageBody> {
                 "`adaptive` is not allowed with control = \"arc_length\", which always adapts its increments",
             );
             let steps = steps(table)?.value;
-            let default = steps.saturating_mul(INCREMENTS_PER_STEP);
+            let default = steps.saturating_mul(INCREMENTS_PER_STEP).max(LEAST_INCREMENTS);
             let max_steps = table.whole_or("max_steps", 1..=MOST_STEPS, default)?;
             Some(StageBody::Path { steps, max_steps })
         }

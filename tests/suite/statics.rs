@@ -400,7 +400,10 @@ fn arc_length_does_not_pass_over_a_structure_that_snaps_through() {
         let events = run.counters.findings.events.iter();
         let limits: Vec<f64> = events.filter(|e| e.kind == EventKind::Limit).map(|e| e.at.load * beyond).collect();
         assert!(
-            limits.len() == 2 && (limits[0] - 1.0).abs() < 1e-6 && (limits[1] + 1.0).abs() < 1e-6,
+            run.end("load") == 1.0
+                && limits.len() == 2
+                && (limits[0] - 1.0).abs() < 1e-6
+                && (limits[1] + 1.0).abs() < 1e-6,
             "{bars} bars of height {height}, {beyond} times the limit in {steps} increments: {limits:?}"
         );
     }

@@ -27,7 +27,7 @@ const EASY: f64 = 5.0;
 /// The contraction of corrections after which the next step stays as long. It grows with the size of
 /// the first correction, which goes with the third power of the length where the bend is followed.
 const STEADY_CONTRACTION: f64 = 0.5 * LARGEST_CONTRACTION;
-/// The longest step, over the first one.
+/// The longest step, over the one that was wanted first.
 const LONGEST: f64 = 2.0;
 /// The longest step where the path is straight and brings little load, over [`LONGEST`].
 const STRETCH: f64 = 8.0;
@@ -38,8 +38,8 @@ const SHORTEST: f64 = 1.0 / 16384.0;
 /// The cosine between tangents, or between a tangent and its chord, below which a step was too
 /// long: it may have come down on another branch.
 const MIN_COSINE: f64 = 0.8;
-/// The same for a step from a point where nothing tells yet how the path bends: a longer one may pass
-/// over the whole way on which a structure snaps through.
+/// The cosine between tangents, or between a tangent and its chord, below which the first step of a path was
+/// too long: it may have passed over the whole way on which a structure snaps through.
 const MIN_COSINE_OF_FIRST: f64 = 0.95;
 /// The longest step that follows the bend of the path, over the one that the bend was taken from.
 const LONGEST_OF_BEND: f64 = 4.0;
@@ -63,6 +63,9 @@ const STALLED: f64 = 0.3;
 const TINY_CORRECTION: f64 = 1e-9;
 /// The length, over the step, to which a special point is located.
 const LOCATED: f64 = 1e-9;
+/// How far aside, over the step, a point is looked at where the tangent is singular to the last digit, as at a limit
+/// point, whose load differs by the square of it.
+const ASIDE: f64 = 1e-6;
 
 /// A special point between two points of a path, as a function that changes its sign there.
 #[derive(Clone, Copy, PartialEq)]
@@ -110,7 +113,7 @@ impl Path {
     /// With its first length. Forces near the limits of floating point have no measure of
     /// displacements: then lengths are no numbers, and no search for a shorter one would end.
     fn begin_with(mut self, stage: &StageRun, first: f64) -> Result<Self, Failure> {
-        (self.first, self.length, self.first_rate) = (first, first, self.here.load_rate);
+        (self.first, self.wanted, self.length, self.first_rate) = (first, first, first, self.here.load_rate);
         if first.is_finite() && self.here.load_rate.is_finite() {
             return Ok(self);
         }
@@ -146,6 +149,8 @@ impl Path {
             here,
             length: 0.0,
             first: 0.0,
+            wanted: 0.0,
+            has_begun: false,
             first_rate: 1.0,
             scale: if moved > 0.0 { 1.0 / moved } else { 0.0 },
         }
@@ -226,11 +231,14 @@ impl Path {
                     let straight = cosine.min(length / self.chord(stage, &next)) >= self.least_cosine();
                     let fine = straight && (is_believed || !self.may_have_jumped(&next));
                     if fine || length <= SHORTEST * self.first {
+                        if !std::mem::replace(&mut self.has_begun, true) {
+                            self.first = length;
+                        }
                         let by_iterations = (EASY / iterations.max(1) as f64).sqrt();
                         let by_contraction = (STEADY_CONTRACTION / contraction).cbrt();
                         let factor = by_iterations.min(by_contraction).clamp(0.5, 2.0);
                         let is_easy = iterations <= 2 && cosine >= STRAIGHT;
-                        let longest = if is_easy { self.longest(next.load_rate) } else { LONGEST * self.first };
+                        let longest = if is_easy { self.longest(next.load_rate) } else { LONGEST * self.wanted };
                         self.length = (length * factor).min(longest.max(length));
                         return Ok((next, length));
                     }
@@ -259,13 +267,13 @@ impl Path {
 
     /// The least cosine between the tangents at the ends of a step, and between a tangent and its chord.
     fn least_cosine(&self) -> f64 {
-        if self.here.bend.is_some() { MIN_COSINE } else { MIN_COSINE_OF_FIRST }
+        if self.has_begun { MIN_COSINE } else { MIN_COSINE_OF_FIRST }
     }
 
     /// The longest step where the path is straight: it brings as much load as the longest one at
     /// the beginning.
     fn longest(&self, load_rate: f64) -> f64 {
-        LONGEST * self.first * (self.first_rate / load_rate).abs().clamp(1.0, STRETCH)
+        LONGEST * self.wanted * (self.first_rate / load_rate).abs().clamp(1.0, STRETCH)
     }
 
     /// How far a point is from here; over its length along the tangent, the cosine between both.
@@ -411,6 +419,12 @@ impl Path {
         (best.0, best.2)
     }
 
+    /// The point `at` ahead along the tangent, where the tangent there is regular.
+    fn point(&self, stage: &mut StageRun, at: f64) -> Option<PathPoint> {
+        let Corrected { charts_changed, .. } = self.advance(stage, at, f64::INFINITY).ok()?;
+        self.arrive(stage, at, charts_changed).ok()
+    }
+
     /// Where a function of the path has its zero between here and a point `length` ahead (Illinois'
     /// regula falsi); `None` where it has none.
     fn locate(
@@ -430,8 +444,8 @@ impl Path {
         for _ in 0..MOST_LOOKS {
             let share = if high.value == low.value { 0.5 } else { -low.value / (high.value - low.value) };
             let at = low.at + (high.at - low.at) * share.clamp(0.02, 0.98);
-            let Corrected { charts_changed, .. } = self.advance(stage, at, f64::INFINITY).ok()?;
-            let point = self.arrive(stage, at, charts_changed).ok()?;
+            let (at, point) =
+                [at, at + ASIDE * length].into_iter().find_map(|at| Some((at, self.point(stage, at)?)))?;
             let value = target.value(&point);
             found = (point, at);
             if value.abs() <= LOCATED * size || (high.at - low.at).abs() <= LOCATED * length {

@@ -39,8 +39,12 @@ pub struct Path {
     pub(super) here: PathPoint,
     /// The length of the next step
     pub(super) length: f64,
-    /// Length of the first step
+    /// Length of the first step: that which is wanted until it is taken
     pub(super) first: f64,
+    /// The length that was wanted for the first step
+    pub(super) wanted: f64,
+    /// True once the first step is taken
+    pub(super) has_begun: bool,
     /// The tangent's part in the load factor at the beginning
     pub(super) first_rate: f64,
     /// 1/U^2
