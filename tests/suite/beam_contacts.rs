@@ -1,7 +1,7 @@
 //! Contact of beams with beams, and with themselves, in whole scenes.
 
 use crate::random::Random;
-use crate::scenes::{Simulation, attempt, simulate};
+use crate::scenes::{Simulation, attempt, frequencies, simulate};
 use beamsim::scene;
 use beamsim_core::failure::FailureKind;
 use beamsim_core::kernel::Weights;
@@ -794,4 +794,30 @@ fn penetrations_between_points_are_told_in_dynamic_stages() {
     };
     assert!(told("5e8", 1));
     assert!(!told("5e6", 100));
+}
+
+/// A cantilever that presses on a beam with its next to last node, between elements of which one is half as long as the
+/// other, at which the stiffness of the contact differs: modal stages hold the contact. Its first frequencies are those
+/// with a contact as stiff as that of EA = 1e9, beside those of the parts alone.
+#[test]
+fn contacts_between_unlike_elements_are_held_in_modal_stages() {
+    for stiff in [1e7, 1e8, 1e9] {
+        let deck = format!(
+            "[point]\nroot = [1, -1, 0.02]\ntip = [1, 0, 0.02]\nend = [1, 0.05, 0.02]\nleft = [0.5, 0, 0]\nright = [1.5, 0, 0]\n\
+             [section.s]\nEA = {stiff}\nGA = {stiff}\nGJ = 1e3\nEI = 500\nrhoA = 1\nrhoJ = [2e-6, 1e-6, 1e-6]\n\
+             [[beam]]\nname = \"up\"\nsection = \"s\"\nthrough = [\"root\", \"tip\", \"end\"]\nelements = [10, 1]\norder = 2\n\
+             [[beam]]\nname = \"low\"\nsection = \"s\"\nthrough = [\"left\", \"right\"]\nelements = 7\norder = 2\n\
+             [[support]]\nat = \"root\"\nfix = \"all\"\n[[support]]\nat = \"left\"\nfix = \"all\"\n\
+             [[support]]\nat = \"right\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 0, -10]\n\
+             [[load]]\nat = \"low@0.5\"\nforce = [0, 0, 10]\n\
+             [[contact]]\nname = \"c\"\nbeams = [\"up\"]\nwith = [\"low\"]\nradius = 0.01\n\
+             [[stage]]\nkind = \"static\"\nsteps = 2\n[[stage]]\nkind = \"modal\"\nmodes = 3\n"
+        );
+        let found = frequencies(&deck);
+        for (found, expected) in found.iter().zip([71.31, 302.7, 446.9]) {
+            assert!((found - expected).abs() < 2e-3 * expected, "{found} for {expected} with EA = {stiff}");
+        }
+        let warned = attempt(&deck).counters.findings.warnings;
+        assert!(warned.is_empty(), "{warned:?}");
+    }
 }

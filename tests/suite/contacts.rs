@@ -1551,3 +1551,43 @@ fn springs_of_points_that_slide_hold_nothing() {
     let soft = run.counters.findings.warnings.iter().find(|warning| warning.kind == WarningKind::SoftStick);
     assert!(soft.is_none(), "{soft:?}");
 }
+
+/// A ladder on a floor and a wall, both with friction mu: it stands where its angle exceeds atan((1 - mu^2)/(2 mu)), with
+/// any number of levels, in random units.
+#[test]
+fn friction_holds_a_ladder_with_any_number_of_levels() {
+    let random = &mut Random::new(98);
+    for _ in 0..25 {
+        let [length, mass] = [0, 0].map(|_| 10.0_f64.powf(random.range(-3.0, 3.0)));
+        let mu = random.range(0.25, 0.9);
+        let least = ((1.0 - mu * mu) / (2.0 * mu)).atan();
+        let angle = random.range(least + 0.05, 1.5);
+        let steps = 10.0_f64.powf(random.range(0.0, 1.5)) as u32;
+        let radius = 0.005 * length;
+        // Forces have the unit of mass times length.
+        let (force, [x, y]) = (mass * length, [angle.cos(), angle.sin()].map(|part| part * length));
+        let deck = format!(
+            "gravity = [0, {gravity:e}, 0]\n[point]\nfoot = [0, 0, 0]\ntop = [{x:e}, {y:e}, 0]\n\
+             [section.s]\nEA = {ea:e}\nGA = {ea:e}\nGJ = {ei:e}\nEI = {ei:e}\nrhoA = {line:e}\n\
+             [[beam]]\nname = \"ladder\"\nsection = \"s\"\nthrough = [\"foot\", \"top\"]\nelements = 8\n\
+             [[surface]]\nname = \"floor\"\nkind = \"plane\"\npoint = [0, {below:e}, 0]\nnormal = [0, 1, 0]\n\
+             [[surface]]\nname = \"wall\"\nkind = \"plane\"\npoint = [{beyond:e}, 0, 0]\nnormal = [-1, 0, 0]\n\
+             [[contact]]\nname = \"below\"\nbeams = [\"ladder\"]\nsurfaces = [\"floor\"]\nradius = {radius:e}\nfriction = {mu}\n\
+             [[contact]]\nname = \"beside\"\nbeams = [\"ladder\"]\nsurfaces = [\"wall\"]\nradius = {radius:e}\nfriction = {mu}\n\
+             [[stage]]\nkind = \"static\"\nsteps = {steps}\n[output]\nnodes = [\"foot\", \"top\"]\ncolumns = [\"u\", \"contact\"]\n",
+            gravity = -9.81 * length,
+            ea = 4e5 * force,
+            ei = 1e3 * force * length * length,
+            line = 10.0 * mass / length,
+            below = -radius,
+            beyond = x + radius,
+        );
+        let run = simulate(&deck);
+        let moved = ["foot.ux", "foot.uy", "top.ux", "top.uy"].map(|column| (run.end(column) / length).abs());
+        let normal = run.end("below.normal") / (98.1 * force);
+        assert!(
+            moved.iter().all(|&moved| moved < 5e-3) && (0.99 / (1.0 + mu * mu)..1.01).contains(&normal),
+            "{moved:?} {normal}\n{deck}"
+        );
+    }
+}

@@ -143,6 +143,25 @@ pub struct ChainMemory {
     pub(crate) nodes: Vec<NodeBefore>,
 }
 
+/// Stiffness of contacts of an element.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+pub struct ContactStiffness {
+    /// First stiffness of augmentations, force per length
+    pub augmented: f64,
+    /// Stiffness of the penalty in dynamic stages, force per length
+    pub penalty: f64,
+}
+
+impl ContactStiffness {
+    /// That with which a stage begins.
+    pub fn first(&self, regime: ContactRegime) -> f64 {
+        match regime {
+            ContactRegime::Augmented => self.augmented,
+            ContactRegime::Penalty => self.penalty,
+        }
+    }
+}
+
 /// A contact point with a force, or with the traction of the last converged state where an augmentation
 /// has found it open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -159,6 +178,8 @@ pub struct PointMemory {
     pub(crate) force: f64,
     /// L of the next evaluation in static stages, with which the force of an accepted state is p
     pub(crate) multiplier: f64,
+    /// Stiffness of the contact when the point was found: L and the offset were computed with it
+    pub(crate) stiffness: ContactStiffness,
     /// g, the gap, a length
     pub(crate) gap: f64,
     /// Its friction at the last converged state, without the weight, in the axes of the surface; of beams in

@@ -24,8 +24,8 @@ pub use assembly::{Matrix, ResidualBuffer, System};
 pub use category::Category;
 pub use connectivity::Connectivity;
 pub use contact::{
-    ChainMemory, Clearance, ContactMemory, ContactRegime, ListedPair, PairPointKind, PairPointMemory, PairsMemory,
-    PointMemory,
+    ChainMemory, Clearance, ContactMemory, ContactRegime, ContactStiffness, ListedPair, PairPointKind, PairPointMemory,
+    PairsMemory, PointMemory,
 };
 pub use dof_map::{Direction, DofMap, FrameConflict};
 pub use field::Field;

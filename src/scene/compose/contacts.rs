@@ -12,13 +12,12 @@ use crate::scene::names::{self, unknown};
 use crate::scene::path;
 use crate::scene::surfaces;
 use beamsim_core::effect::contact::{
-    BeamPairs, Chain, ChainNode, ContactLaws, ContactStiffness, Meeting, SceneSurface, Strand, SurfaceCarrier,
-    SurfaceContacts,
+    BeamPairs, Chain, ChainNode, ContactLaws, Meeting, SceneSurface, Strand, SurfaceCarrier, SurfaceContacts,
 };
 use beamsim_core::kernel::contact::law::damping_of;
 use beamsim_core::model::Amplitude;
 use beamsim_core::run::Driven;
-use beamsim_core::system::Slot;
+use beamsim_core::system::{ContactStiffness, Slot};
 use beamsim_core::tensor::Vec3;
 use std::f64::consts::PI;
 use std::sync::Arc;

@@ -140,7 +140,7 @@ impl<'a> ChainNow<'a> {
     fn memory_of(&self, point: &PointNow, accepts: bool) -> PointMemory {
         let PointNow { candidate, state, law, .. } = point;
         let rotation = &self.carrier.rotation.r;
-        let stiffness = &self.chain.stiffness[candidate.element];
+        let stiffness = self.chain.stiffness[candidate.element];
         let first = stiffness.first(self.at.contacts.regime);
         let carried = if accepts { self.laws.carried(law.friction.is_some(), first, state) } else { law.carried };
         let contact = self.place(candidate) - *rotation * state.normal * self.chain.radius;
@@ -156,6 +156,7 @@ impl<'a> ChainNow<'a> {
             weight: candidate.weight,
             force,
             multiplier,
+            stiffness,
             gap,
             carried,
             offset: law.normal.offset(),

@@ -1,8 +1,7 @@
 //! The laws of a contact, and bounds that surfaces and pairs of beams share.
 
-use super::strand::ContactStiffness;
 use crate::kernel::contact::{CarriedTraction, FrictionLaw, NormalLaw, PointState, Status};
-use crate::system::{ContactMemory, ContactRegime};
+use crate::system::{ContactMemory, ContactRegime, ContactStiffness};
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;

@@ -21,7 +21,7 @@ pub use chain::Chain;
 pub use laws::ContactLaws;
 pub use pairs::{BeamPairs, Meeting};
 pub use shown::{ContactParty, NodeContact, NodeContacts};
-pub use strand::{ChainNode, ContactStiffness, Strand};
+pub use strand::{ChainNode, Strand};
 pub use surface::{SceneSurface, SurfaceCarrier};
 
 use super::{
@@ -149,7 +149,8 @@ impl SurfaceContacts {
         self.pairs().remember(at, accepts);
     }
 
-    /// Gives each point in memory the weight of its candidate in the stage that begins: its force stays.
+    /// Gives each point in memory the weight and the stiffness of its candidate in the stage that begins: its force
+    /// stays.
     fn share_held(&self, at: &mut State) {
         let mut chains = (*at.contacts.chains).clone();
         for (number, memory) in chains.iter_mut().enumerate().filter(|(number, _)| self.is_near(*number, at)) {
@@ -157,6 +158,7 @@ impl SurfaceContacts {
             for (candidate, predecessors) in chain.candidates.iter().zip(&chain.predecessors) {
                 if let Some(own) = predecessors.own {
                     memory.points[own].reweigh(candidate.weight);
+                    memory.points[own].stiffness = self.chains[number].stiffness[candidate.element];
                 }
             }
         }
@@ -185,8 +187,7 @@ impl SurfaceContacts {
             let laws = &self.laws[chain.contact];
             let points = if laws.rubs() { &memory.points[..] } else { &[] };
             for point in points {
-                let element = (point.place as usize).min(chain.elements() - 1);
-                show(chain, point, laws.stick_stiffness(chain.contact, &chain.stiffness[element], &at.contacts));
+                show(chain, point, laws.stick_stiffness(chain.contact, &point.stiffness, &at.contacts));
             }
         }
     }
@@ -216,17 +217,14 @@ impl SurfaceContacts {
         length
     }
 
-    /// Changes the memory of all points with a force; shows them with the stiffness of their element.
-    fn change_points(&self, at: &mut State, change: impl Fn(&mut PointMemory, &ContactStiffness)) {
+    /// Changes the memory of all points with a force.
+    fn change_points(&self, at: &mut State, change: impl Fn(&mut PointMemory)) {
         let mut chains = (*at.contacts.chains).clone();
-        for (chain, memory) in self.chains.iter().zip(&mut chains) {
-            for point in &mut memory.points {
-                let element = (point.place as usize).min(chain.elements() - 1);
-                change(point, &chain.stiffness[element]);
-            }
-        }
+        chains.iter_mut().flat_map(|memory| &mut memory.points).for_each(&change);
         at.contacts.chains = Arc::new(chains);
-        self.pairs().change_points(at, &change);
+        let mut points = (*at.contacts.pairs.points).clone();
+        points.iter_mut().for_each(|known| change(&mut known.point));
+        at.contacts.pairs.points = Arc::new(points);
     }
 
     /// Notes the deepest penetration and the shortest contact of a time step.
@@ -401,6 +399,10 @@ impl Effect for SurfaceContacts {
 }
 
 impl DrivenCoordinates for SurfaceContacts {
+    fn act_at_once(&self) -> bool {
+        false
+    }
+
     fn drives(&self, at: &State, _origin: Option<&State>, show: &mut dyn FnMut(f64, f64)) {
         for (number, chain) in self.chains.iter().enumerate() {
             let surface = &self.surfaces[chain.surface];
@@ -517,8 +519,8 @@ impl Contacts for SurfaceContacts {
 
     fn hold(&self, at: &mut State) {
         at.contacts.factor = HELD;
-        self.change_points(at, |point, stiffness| {
-            point.multiplier = point.force + stiffness.augmented * HELD * point.gap
+        self.change_points(at, |point| {
+            point.multiplier = point.force + point.stiffness.augmented * HELD * point.gap;
         });
     }
 
@@ -535,8 +537,8 @@ impl Contacts for SurfaceContacts {
         at.contacts.regime = ContactRegime::Penalty;
         self.share_held(at);
         self.pairs().begin_penalty(at);
-        self.change_points(at, |point, stiffness| {
-            point.offset = point.force / stiffness.penalty + point.gap;
+        self.change_points(at, |point| {
+            point.offset = point.force / point.stiffness.penalty + point.gap;
             point.steps = 0;
         });
         at.contacts.taken_over = Contacts::energy(self, at) - before;
@@ -548,7 +550,7 @@ impl Contacts for SurfaceContacts {
         }
         self.remember(at, true);
         // None of them has lasted a step.
-        self.change_points(at, |point, _| point.steps = 0);
+        self.change_points(at, |point| point.steps = 0);
         at.contacts.damping_power = self.damping_power(at);
     }
 

@@ -1,6 +1,6 @@
 //! A beam or a body in contact: its nodes, its radius, its stiffness.
 
-use crate::system::{ContactRegime, Node};
+use crate::system::{ContactStiffness, Node};
 use crate::tensor::Vec3;
 
 /// A node of a strand.
@@ -12,25 +12,6 @@ pub struct ChainNode {
     pub place: Vec3,
     /// The part of the length of the beam before it
     pub fraction: f64,
-}
-
-/// Stiffness of contacts of an element.
-#[derive(Clone, Copy, Debug)]
-pub struct ContactStiffness {
-    /// First stiffness of augmentations, force per length
-    pub augmented: f64,
-    /// Stiffness of the penalty in dynamic stages, force per length
-    pub penalty: f64,
-}
-
-impl ContactStiffness {
-    /// That with which a stage begins.
-    pub(super) fn first(&self, regime: ContactRegime) -> f64 {
-        match regime {
-            ContactRegime::Augmented => self.augmented,
-            ContactRegime::Penalty => self.penalty,
-        }
-    }
 }
 
 /// A beam or a body in contact.

@@ -13,6 +13,7 @@
 
 use crate::effect::{ContactChange, Contacts};
 use crate::integrate::Equilibrium;
+use crate::run::distance::distance;
 use crate::run::stage_run::StageRun;
 use crate::scalar::CompressedField;
 use crate::solve::NewtonFailure;
@@ -20,6 +21,9 @@ use crate::system::State;
 
 /// A stiffness of stick that has become too small is raised to this multiple of what is needed.
 const STICK_RESERVE: f64 = 2.0;
+
+/// The motion, over the length of the scene or in radians, that firmer contacts may make in any case.
+const FAR: f64 = 1e-3;
 
 /// A part of a stiffness that is all of it.
 const ALL_BUT_ROUND_OFF: f64 = 1.0 - 1e-12;
@@ -87,6 +91,18 @@ struct LevelAttempts {
     resists: bool,
     /// True if that has been tried
     has_resisted: bool,
+    /// An attempt with the stiffest contact, where the first points with friction come into contact
+    stiff_start: StiffStart,
+}
+
+/// Whether a level has been tried with the stiffest contact.
+#[derive(Clone, Copy, PartialEq)]
+enum StiffStart {
+    Possible,
+    /// In the last attempt
+    Tried,
+    /// Before others, softer ones
+    Over,
 }
 
 impl StageRun<'_> {
@@ -101,6 +117,7 @@ impl StageRun<'_> {
             goes_on: true,
             resists: false,
             has_resisted: false,
+            stiff_start: StiffStart::Possible,
         };
         loop {
             let contacts = &mut self.state.contacts;
@@ -151,6 +168,7 @@ impl StageRun<'_> {
         }
         let is_stiff = self.good.contacts.first_factor > NEARLY_SOFTEST;
         let sticks_firmly = self.rubs() && attempts.softened_stick > NEARLY_SOFTEST;
+        let may_begin_stiffly = self.rubs() && !touched && self.good.contacts.first_factor < STIFFEST_START;
         attempts.resists = false;
         if attempts.goes_on && touched {
             // Where all points slide nothing may hold a part.
@@ -158,9 +176,17 @@ impl StageRun<'_> {
         } else if matches!(failure, NewtonFailure::Singular(_)) && !attempts.has_resisted {
             attempts.has_resisted = true;
             attempts.resists = true;
+        } else if may_begin_stiffly && attempts.stiff_start == StiffStart::Possible {
+            // Nothing rubs before it is pressed, and a soft contact is pressed only by a long way.
+            attempts.stiff_start = StiffStart::Tried;
+            self.set_first_factor(STIFFEST_START);
+            self.counters.contacts.stiffenings += 1;
         } else if is_stiff || sticks_firmly {
             if sticks_firmly {
                 attempts.softened_stick /= GROWTH;
+            }
+            if std::mem::replace(&mut attempts.stiff_start, StiffStart::Over) == StiffStart::Tried {
+                self.set_first_factor(attempts.first_factor);
             }
             self.set_first_factor((self.good.contacts.first_factor / GROWTH).max(SOFTEST));
             self.counters.contacts.softenings += 1;
@@ -265,7 +291,17 @@ impl StageRun<'_> {
             newton.begin_anew();
             match newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work) {
                 Ok(()) => {
-                    *growth = growth.powf(GROWTH_POWER_AFTER_SUCCESS).min(GROWTH);
+                    let slid_from = before.as_ref().filter(|before| self.slides_away(before));
+                    match slid_from {
+                        Some(before) if *growth > SMALLEST_GROWTH => {
+                            *growth = growth.powf(GROWTH_POWER_AFTER_FAILURE);
+                            self.state.copy_from(before);
+                            continue;
+                        }
+                        // It slides however little the stiffness grows.
+                        Some(_) => *growth = GROWTH,
+                        None => *growth = growth.powf(GROWTH_POWER_AFTER_SUCCESS).min(GROWTH),
+                    }
                     return Ok(());
                 }
                 Err(failure) => match &before {
@@ -277,6 +313,12 @@ impl StageRun<'_> {
                 },
             }
         }
+    }
+
+    /// True if firmer contacts with friction have let a part go further than the level has moved it before.
+    fn slides_away(&self, before: &State) -> bool {
+        let Self { model, good, state, .. } = self;
+        self.rubs() && distance(model, before, state) > distance(model, good, before).max(FAR)
     }
 
     fn end_augmentations(

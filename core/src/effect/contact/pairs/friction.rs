@@ -57,11 +57,6 @@ impl<'a> PairsNow<'a> {
         )
     }
 
-    /// K_t of a pair.
-    fn stick(&self, pair: &ListedPair, laws: &ContactLaws) -> f64 {
-        laws.stick_stiffness(self.pairs.contact_of(pair.meeting as usize), &self.stiffness(pair), &self.at.contacts)
-    }
-
     /// The node of the second element that carries a pair. It stays where the point moves along the
     /// element: the node nearest to the place of the point at the last converged state, or one in the
     /// middle.
@@ -171,11 +166,11 @@ impl PairRole<'_> {
 
     /// Shows the points in memory of contacts with friction, with the stiffness K_t of stick.
     fn each_spring(self, at: &State, show: &mut dyn FnMut(&PairPointMemory, f64)) {
-        let now = self.now(at);
         for point in at.contacts.pairs.points.iter() {
             let laws = self.law_of(point.meeting);
             if laws.rubs() {
-                show(point, now.stick(&now.pair_of(point), laws));
+                let contact = self.pairs.contact_of(point.meeting as usize);
+                show(point, laws.stick_stiffness(contact, &point.point.stiffness, &at.contacts));
             }
         }
     }

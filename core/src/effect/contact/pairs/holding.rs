@@ -78,7 +78,8 @@ impl PairsNow<'_> {
             let elements = self.list[*number].elements;
             let [place, on_second] = [0, 1].map(|side| f64::from(elements[side]) + candidate.at[side]);
             let carried = CarriedTraction { force: traction, ..nearest.point.carried };
-            let point = PointMemory { place, force, carried, weight: candidate.weight, ..nearest.point };
+            let stiffness = self.stiffness(&self.list[*number]);
+            let point = PointMemory { place, force, carried, stiffness, weight: candidate.weight, ..nearest.point };
             out.push(PairPointMemory { kind: candidate.kind, on_second, point, ..*nearest });
         }
         out.extend(known.iter().zip(&weights).filter(|(_, weight)| **weight == 0.0).map(|(point, _)| *point));

@@ -4,13 +4,12 @@ use super::candidate::{Kinds, PairCandidate, Side, candidates};
 use super::{BeamPairs, ElementOf};
 use crate::effect::contact::laws::{ContactLaws, TOUCHING};
 use crate::effect::contact::predecessors::{LARGEST_SHIFT, Link, Predecessors, Relation};
-use crate::effect::contact::strand::ContactStiffness;
 use crate::kernel::contact::along::weighted_sum;
 use crate::kernel::contact::{
     CarriedTraction, ContactNode, NodeTurning, PairLaw, PairSide, PointState, ShapeAt, add_pair,
 };
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{ContactRegime, ListedPair, PairPointKind, PairPointMemory, PointMemory, State};
+use crate::system::{ContactRegime, ContactStiffness, ListedPair, PairPointKind, PairPointMemory, PointMemory, State};
 use crate::tensor::{Mat3, Vec3};
 use std::borrow::Cow;
 
@@ -191,24 +190,10 @@ impl<'a> PairsNow<'a> {
         let of_point = |point: &PairPointMemory| match self.at.contacts.regime {
             ContactRegime::Penalty => point.point.offset,
             ContactRegime::Augmented => {
-                let stiffness = self.stiffness_at(point).augmented * self.at.contacts.factor;
-                point.point.multiplier / stiffness
+                point.point.multiplier / (point.point.stiffness.augmented * self.at.contacts.factor)
             }
         };
         memory.iter().map(of_point).fold(touching, f64::max)
-    }
-
-    /// The stiffness of the contact at a point in memory.
-    pub fn stiffness_at(&self, point: &PairPointMemory) -> ContactStiffness {
-        self.stiffness(&self.pair_of(point))
-    }
-
-    /// The elements of a point in memory.
-    pub fn pair_of(&self, point: &PairPointMemory) -> ListedPair {
-        let strands = self.pairs.both(point.meeting as usize);
-        let place = [point.point.place, point.on_second];
-        let element = |side: usize| (place[side] as usize).min(strands[side].elements() - 1) as u32;
-        ListedPair { meeting: point.meeting, elements: [element(0), element(1)] }
     }
 
     /// The stiffness of the contact of two elements: that of both in series.
@@ -371,14 +356,14 @@ impl<'a> PairsNow<'a> {
         let contacts = &self.at.contacts;
         let (gap, force) = (state.gap, state.normal_force.force);
         let normal = point.normal();
+        let stiffness = self.stiffness(pair);
         // Stages go on with the first stiffness.
-        let first = self.stiffness(pair).augmented * contacts.first_factor;
+        let first = stiffness.augmented * contacts.first_factor;
         let is_penalty = contacts.regime == ContactRegime::Penalty;
         let before = point.partner.filter(|_| is_penalty).map(|before| before.point);
         let carried = if accepts {
             let laws = &self.laws[self.pairs.contact_of(pair.meeting as usize)];
-            laws.carried(law.friction.is_some(), self.stiffness(pair).first(contacts.regime), state)
-                .turned(&point.carrier)
+            laws.carried(law.friction.is_some(), stiffness.first(contacts.regime), state).turned(&point.carrier)
         } else {
             point.carried
         };
@@ -392,6 +377,7 @@ impl<'a> PairsNow<'a> {
                 weight: candidate.weight,
                 force,
                 multiplier: if accepts { force + first * gap } else { force },
+                stiffness,
                 gap,
                 carried,
                 offset: law.normal.offset(),

@@ -4,12 +4,11 @@ use super::BeamPairs;
 use super::point::{PairPoint, PairsNow, sort};
 use crate::effect::contact::late_touch::{LateTouch, PointFriction};
 use crate::effect::contact::laws::{ContactLaws, RELEVANT_FORCE};
-use crate::effect::contact::strand::ContactStiffness;
 use crate::effect::contact_role::TOLD_PENETRATION;
 use crate::effect::{ContactChange, ContactResultant, ContactSurvey, Penetration};
 use crate::kernel::Weights;
 use crate::kernel::contact::Status;
-use crate::system::{Assembler, ListedPair, PairPointKind, PairPointMemory, PointMemory, Slot, State};
+use crate::system::{Assembler, ListedPair, PairPointKind, PairPointMemory, Slot, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -103,17 +102,6 @@ impl<'a> PairRole<'a> {
     /// Lets points share what multipliers held.
     pub fn begin_penalty(self, at: &mut State) {
         at.contacts.pairs.points = Arc::new(self.now(at).holding_points());
-    }
-
-    /// Changes the memory of all points; shows them with the stiffness of their pair.
-    pub fn change_points(self, at: &mut State, change: &impl Fn(&mut PointMemory, &ContactStiffness)) {
-        let mut points = (*at.contacts.pairs.points).clone();
-        let now = self.now(at);
-        for point in &mut points {
-            let stiffness = now.stiffness_at(point);
-            change(&mut point.point, &stiffness);
-        }
-        at.contacts.pairs.points = Arc::new(points);
     }
 
     /// Adds to what was found of other contacts in a balanced state.
