@@ -4,6 +4,7 @@ use super::mesh::{Mesh, MeshBeam};
 use beamsim_core::effect::Effect;
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::probe::{BeamElements, BeamPoint};
+use beamsim_core::section::{Matrix6, Vector6};
 use beamsim_core::system::Slot;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, OnceLock};
@@ -80,6 +81,7 @@ impl BeamPoints<'_> {
             1 => self.plain.of_beams(self.mesh, self.effects)[number].clone(),
             _ => Arc::default(),
         };
+        let stiffness = beam.section.at(fraction).stiffness;
         BeamPoint {
             beam: number,
             fraction,
@@ -87,6 +89,8 @@ impl BeamPoints<'_> {
             elements: BeamElements { first: beam.elements.start as u32, plain },
             sides,
             frame: beam.frame(fraction),
+            compliance: Matrix6::from_fn(|i, j| stiffness[i][j]).try_inverse(),
+            free: beam.free_strain.as_ref().map_or(Vector6::zeros(), |free| Vector6::from(free.strain)),
         }
     }
 }

@@ -8,7 +8,6 @@ use beamsim_core::effect::spring::Link;
 use beamsim_core::probe::{Figure, Line, LinePoint, Place};
 use beamsim_core::section::recovery::PlacedRecovery;
 use beamsim_core::tensor::Mat3;
-use nalgebra::Matrix6;
 use std::sync::Arc;
 
 /// Stresses of the sections at the nodes of each beam, where they are known
@@ -54,12 +53,9 @@ fn point(points: &BeamPoints, number: usize, k: usize, section: Option<PlacedRec
     let at = k % beam.order;
     let before = (at == 0 && element > 0).then(|| side(element - 1, beam.order)).flatten();
     let sides = before.into_iter().chain(side(element, at)).collect();
-    let stiffness = beam.section.at(fraction).stiffness;
-    let compliance = Matrix6::from_fn(|i, j| stiffness[i][j]).try_inverse().unwrap_or_default();
     LinePoint {
         place: Place { nodes: vec![(node.node, node.place, 1.0)], frame, relative: false },
         inside: points.point(number, fraction, sides),
-        compliance: std::array::from_fn(|i| std::array::from_fn(|j| compliance[(i, j)])),
         section,
     }
 }

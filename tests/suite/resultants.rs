@@ -264,3 +264,45 @@ fn error_bars_hold_the_errors_of_resultants() {
         }
     }
 }
+
+/// Strains of tapered and twisted beams are resultants over the stiffness of the section at their place, plus the free
+/// strain there, at nodes and between them, with elements of all orders, in linear and other stages.
+#[test]
+fn strains_belong_to_the_section_at_their_place() {
+    let mut random = Random::new(99);
+    for number in 0..12 {
+        let sections: Vec<[f64; 6]> =
+            (0..2).map(|_| [1e5, 2e4, 3e4, 8.0, 10.0, 20.0].map(|size| size * random.range(0.2, 3.0))).collect();
+        let section = |name: &str, [ea, ga2, ga3, gj, ei2, ei3]: [f64; 6]| {
+            format!("[section.{name}]\nEA = {ea}\nGA = [{ga2}, {ga3}]\nGJ = {gj}\nEI = [{ei2}, {ei3}]\n")
+        };
+        let free: Vec<f64> = (0..6).map(|k| random.range(-1.0, 1.0) * if k < 3 { 1e-2 } else { 0.5 }).collect();
+        let places = [0.0, 0.5, 0.6, 1.0];
+        let nodes = places.map(|place| format!("arm@{place}"));
+        let deck = format!(
+            "{}{}[[beam]]\nname = \"arm\"\nsection = [\"s\", \"t\"]\nthrough = [[0, 0, 0], {}]\nelements = 4\norder = {}\n\
+             twist = [0, {}]\nfree_strain = {free:?}\nhistory = \"h\"\n[history.h]\ntimes = [0, 1]\nvalues = [0, 0.5]\n[[support]]\nat = \"arm@start\"\nfix = \"all\"\n\
+             [[load]]\nat = \"arm@end\"\nforce = {}\nmoment = {}\n{STATIC}[effects]\nlarge_rotations = {}\n\
+             [output]\nnodes = {nodes:?}\ncolumns = [\"resultant\", \"strain\"]\n",
+            section("s", sections[0]),
+            section("t", sections[1]),
+            list(random.direction()),
+            1 + number % 3,
+            random.range(-1.5, 1.5),
+            list(random.vector(1.0)),
+            list(random.vector(0.5)),
+            number < 6,
+        );
+        let run = simulate(&deck);
+        for (place, node) in places.iter().zip(&nodes) {
+            for (k, (strain, resultant)) in
+                ["G1", "G2", "G3", "K1", "K2", "K3"].into_iter().zip(["N1", "N2", "N3", "M1", "M2", "M3"]).enumerate()
+            {
+                let stiffness = sections[0][k] * (1.0 - place) + sections[1][k] * place;
+                let expected = run.end(&format!("{node}.{resultant}")) / stiffness + 0.5 * free[k];
+                let found = run.end(&format!("{node}.{strain}"));
+                assert!((found - expected).abs() < 1e-11, "{strain} at {node}: {found} for {expected}\n{deck}");
+            }
+        }
+    }
+}

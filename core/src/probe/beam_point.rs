@@ -1,8 +1,8 @@
 //! Points of beams that strains, resultants and stresses are read at.
 
 use crate::effect::elasticity::{ElementStresses, StressField};
-use crate::section::Vector6;
 use crate::section::recovery::{PlacedRecovery, PointStress};
+use crate::section::{Matrix6, Vector6};
 use crate::system::State;
 use crate::tensor::{Mat3, Vec3};
 use std::collections::VecDeque;
@@ -23,6 +23,10 @@ pub struct BeamPoint {
     pub sides: Vec<(u32, f64)>,
     /// Initial section axes as columns
     pub frame: Mat3,
+    /// Strains over resultants, section axes; `None` for a section without stiffness against some strain
+    pub compliance: Option<Matrix6>,
+    /// Gamma and K of the free strain, section axes, where its amplitude is one
+    pub free: Vector6,
 }
 
 /// The elements of a beam.
@@ -112,15 +116,21 @@ impl BeamPoint {
         [0, 1].map(|part| std::array::from_fn(|k| mean(part, k)))
     }
 
-    /// Gamma and K, then N and M, in section axes, on each side: see [`ElementStresses`].
+    /// Gamma and K, then N and M, in section axes, on each side: see [`ElementStresses`]. Strains belong to the
+    /// resultants and to the section at the point.
     pub fn at_sides(&self, cache: &mut ElementCache) -> Vec<[[f64; 6]; 2]> {
         let local = |v: Vec3| self.frame.transpose_mul(v).0;
         let mut of_side = |&(element, xi): &(u32, f64)| {
             let stresses = cache.element(element, &self.elasticity)?;
             let along = if stresses.hides_force_along() { self.force_along(element, cache) } else { Vec3::ZERO };
             let (strain, stress) = stresses.at(xi, along);
-            let six = |a: Vec3, b: Vec3| [local(a), local(b)].as_flattened().try_into().expect("two times three");
-            Some([six(strain.gamma, strain.kappa), six(stress.n, stress.m)])
+            let six = |a: Vec3, b: Vec3| Vector6::from_iterator([local(a), local(b)].into_iter().flatten());
+            let resultant = six(stress.n, stress.m);
+            let strain = match &self.compliance {
+                Some(compliance) => compliance * resultant + self.free * stresses.free_amplitude,
+                None => six(strain.gamma, strain.kappa),
+            };
+            Some([strain.into(), resultant.into()])
         };
         self.sides.iter().filter_map(&mut of_side).collect()
     }

@@ -42,8 +42,6 @@ pub struct LinePoint {
     pub place: Place,
     /// Point of the beam for strains and resultants
     pub inside: BeamPoint,
-    /// Compliance: strains over resultants, section axes
-    pub compliance: [[f64; 6]; 6],
     /// Stresses of the section, where they are wanted and known
     pub section: Option<PlacedRecovery>,
 }
@@ -127,9 +125,9 @@ impl Figure {
 impl LinePoint {
     fn look(&self, cache: &mut ElementCache) -> Look {
         let [strain, resultant] = self.inside.strain_and_stress(cache);
-        let row = |row: &[f64; 6]| row.iter().zip(&resultant).map(|(c, s)| c * s).sum::<f64>();
         // Energy of the strains that have stress: free strains have none.
-        let energy = 0.5 * self.compliance.iter().zip(&resultant).map(|(c, s)| s * row(c)).sum::<f64>();
+        let stress = Vector6::from(resultant);
+        let energy = self.inside.compliance.map_or(0.0, |compliance| 0.5 * stress.dot(&(compliance * stress)));
         Look { strain, resultant, energy, ..bare(&self.place, cache.state) }
     }
 }

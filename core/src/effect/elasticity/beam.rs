@@ -269,6 +269,10 @@ impl<I: Interpolation> StressPoints for BeamElasticity<I> {
 }
 
 impl<I: Interpolation> DrivenCoordinates for BeamElasticity<I> {
+    fn act_at_once(&self) -> bool {
+        true
+    }
+
     fn drives(&self, at: &State, origin: Option<&State>, show: &mut dyn FnMut(f64, f64)) {
         for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free().is_some()) {
             let pull: f64 = element

@@ -24,7 +24,7 @@
 use super::element::{ElasticElement, ElasticPoint};
 use super::interpolation::{Interpolation, View};
 use crate::kernel::NodePlace;
-use crate::kernel::law::{SectionLaw, Stiffness, Strain, Stress};
+use crate::kernel::law::{Strain, Stress};
 use crate::kernel::shape::{gauss, lagrange};
 use crate::rotation::Rotation;
 use crate::scalar::Jet;
@@ -33,13 +33,13 @@ use crate::tensor::Vec3;
 
 type Vector6 = nalgebra::Vector6<f64>;
 
-type Matrix6 = nalgebra::Matrix6<f64>;
-
 /// Strains and stress resultants of an element at one state (material, global components).
 #[derive(Clone, Debug)]
 pub struct ElementStresses {
     /// Coordinates of the integration points on [-1, 1]
     xi: Vec<f64>,
+    /// The amplitude of the free strain
+    pub(crate) free_amplitude: f64,
     points: Vec<StressedPoint>,
 }
 
@@ -57,8 +57,6 @@ struct StressedPoint {
     tangent: Vec3,
     /// Initial length over xi
     stretch: f64,
-    /// Elastic stresses over strains
-    stiffness: Stiffness,
 }
 
 impl ElementStresses {
@@ -69,7 +67,8 @@ impl ElementStresses {
     }
 
     /// Strain and elastic stress at `xi` on [-1, 1], under the force per length `along`, which is
-    /// zero for elements with several points.
+    /// zero for elements with several points. The strain is that of the polynomial through the integration points,
+    /// which does not know how the section varies.
     pub fn at(&self, xi: f64, along: Vec3) -> (Strain, Stress) {
         let share = |g: usize| lagrange(&self.xi, g, xi);
         let each = || self.points.iter().enumerate();
@@ -78,7 +77,7 @@ impl ElementStresses {
             [point] => point.elastic_part(&(self.change(0, xi) + point.change_along(xi, along))),
             _ => each().map(|(g, _)| self.change(g, xi) * share(g)).sum(),
         };
-        let strain = each().map(|(g, point)| (point.strain_vector() + point.compliance() * change) * share(g)).sum();
+        let strain = each().map(|(g, point)| point.strain_vector() * share(g)).sum();
         (strain_of(&strain), stress_of(&(elastic + change)))
     }
 
@@ -150,12 +149,6 @@ impl StressedPoint {
         vector(&Stress { n: gamma, m: kappa })
     }
 
-    /// Strains over elastic stresses. Strains of a singular section do not follow the stresses.
-    fn compliance(&self) -> Matrix6 {
-        let column = |k: usize| vector(&self.stiffness.stress(&strain_of(&Vector6::ith(k, 1.0))));
-        Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(column)).try_inverse().unwrap_or_default()
-    }
-
     /// The elastic part of a change of force and moment along the element: that of the forces, and of
     /// the moments, at this point.
     fn elastic_part(&self, change: &Vector6) -> Vector6 {
@@ -212,8 +205,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         });
         // Free strains act as loads of a linear stage: its geometric stiffness leaves their stresses
         // out.
-        let free = self.free_amplitude(at);
-        let [value, rate] = if origin.is_some() { [0.0, free] } else { [free, 0.0] };
+        let free_amplitude = self.free_amplitude(at);
+        let [value, rate] = if origin.is_some() { [0.0, free_amplitude] } else { [free_amplitude, 0.0] };
         let free = Jet { value, rate, rate2: 0.0 };
         let of_point = |(point, &(_, weight)): (&ElasticPoint<N>, &(f64, f64))| {
             let (strain, elastic) = point.lifted::<Jet>().strain_and_stress(&nodes, free);
@@ -223,11 +216,11 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
                 damping: Stress { n: Vec3::zero(), m: Vec3::zero() },
                 tangent: point.tangent,
                 stretch: point.weight / weight,
-                stiffness: point.law.stiffness_at_rest(),
             }
         };
         ElementStresses {
             xi: gauss(G).iter().map(|&(xi, _)| xi).collect(),
+            free_amplitude,
             points: self.points().iter().zip(gauss(G)).map(of_point).collect(),
         }
     }
