@@ -452,3 +452,30 @@ fn slow_modes_beside_creeping_ones_are_listed() {
         }
     }
 }
+
+/// Motors hold all bodies: no mode is invented, neither along the axes nor in random directions.
+#[test]
+fn what_motors_hold_has_no_modes() {
+    let mut random = Random::new(97);
+    let along = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]].map(Vec3);
+    for number in 0..20 {
+        let [b, first, second] = if number < 10 { along } else { [0; 3].map(|_| random.direction()) };
+        let size = if number < 10 { 0.1 } else { 10.0_f64.powf(random.range(-3.0, 3.0)) };
+        let inertia = list(Vec3([size; 3]));
+        let body = |at: &str, mass: f64| format!("[[body]]\nat = \"{at}\"\nmass = {mass}\ninertia = {inertia}\n");
+        let joint = |nodes: &str, axis: Vec3, angle: f64| {
+            format!("[[joint]]\nkind = \"revolute\"\nnodes = [{nodes}]\naxis = {}\nangle = {angle}\n", list(axis))
+        };
+        let deck = format!(
+            "[point]\na = [0, 0, 0]\nb = {}\n{}{}{}{}[[stage]]\nkind = \"static\"\nsteps = 2\n\
+             [[stage]]\nkind = \"modal\"\nmodes = 1\n",
+            list(b),
+            body("a", 2.0),
+            body("b", 1.0),
+            joint("\"a\"", first, random.range(-1.0, 1.0)),
+            joint("\"a\", \"b\"", second, random.range(-1.0, 1.0)),
+        );
+        let why = format!("{:?}", attempt(&deck).result.err());
+        assert!(why.contains("leave no motion"), "{why}\n{deck}");
+    }
+}

@@ -460,3 +460,27 @@ fn a_bead_beside_the_line_begins_a_dynamic_stage() {
     let farthest = x.iter().fold(f64::MIN, |m, x| m.max(*x));
     assert!((x[0] + sin).abs() < 1e-12 && (farthest - sin).abs() < 1e-3, "{farthest}");
 }
+
+/// A free strain that jumps where a dynamic stage begins does work: the account stays closed.
+#[test]
+fn a_free_strain_that_jumps_does_its_work() {
+    for treated in ["", "[effects]\nlarge_rotations = false\n"] {
+        let arm =
+            ARM.replace("elements = 2\n", "elements = 2\nfree_strain = [1e-3, 0, 0, 0, 0.3, -0.2]\nhistory = \"h\"\n");
+        let history = "[history.h]\ntimes = [0, 0.5, 1]\nvalues = [0, 0, 1]\n";
+        let steps = dynamic(0.2).replace("step = 0.01", "step = 1e-4").replace("alpha\"", "alpha\"\nrho_inf = 1");
+        let deck = format!(
+            "{arm}{history}{CLAMP}{STATIC}{steps}[output]\nnodes = [\"tip\"]\ncolumns = [\"u\", \"energy\"]\n{treated}"
+        );
+        let run = simulate(&deck);
+        let (total, strain) = (run.column("energy.total"), run.column("energy.strain"));
+        let largest = strain.iter().fold(0.0_f64, |largest, &strain| largest.max(strain));
+        let off = total.iter().fold(0.0_f64, |off, &now| off.max((now - total[0]).abs()));
+        assert!(
+            run.column("tip.uy").last().unwrap().abs() > 0.05 && off < 2e-3 * largest,
+            "{treated}{off} of {largest}"
+        );
+        let told = run.counters.findings.warnings.iter().map(|warning| warning.kind);
+        assert!(told.clone().all(|kind| kind != WarningKind::EnergyBalance), "{:?}", told.collect::<Vec<_>>());
+    }
+}

@@ -332,6 +332,20 @@ pub trait DrivenCoordinates {
     /// energy balance. `origin` is the state about which the stage is linear; `None` in other
     /// stages.
     fn drives(&self, at: &State, origin: Option<&State>, show: &mut dyn FnMut(f64, f64));
+
+    /// True where a jump of a coordinate does its work at once, whatever moves later: free strains.
+    fn act_at_once(&self) -> bool;
+}
+
+/// A coordinate that is driven from outside, at one state.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+pub struct Drive {
+    /// Its value
+    pub value: f64,
+    /// The derivative of the stored energy over it
+    pub force: f64,
+    /// See [`DrivenCoordinates::act_at_once`]
+    pub acts_at_once: bool,
 }
 
 /// The role of effects with spins that no force resists.

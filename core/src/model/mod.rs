@@ -30,7 +30,7 @@ pub use section::{MassPerLength, SectionMatrices};
 pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError, SurfaceJump};
 
 use crate::effect::joint::nearest_angle;
-use crate::effect::{Constraint, Contacts, Effect, Energy, ForceJumps, Momentum, MotorState};
+use crate::effect::{Constraint, Contacts, Drive, Effect, Energy, ForceJumps, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
 use crate::system::{Category, DofMap, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System, most_regions};
 use crate::tensor::Vec3;
@@ -204,6 +204,18 @@ impl Model {
         let is_free = |&slot: &Slot| dof_map.of(slot).iter().any(|&number| number != DofMap::HELD);
         let effects = self.effects.iter().filter(|effect| effect.category() == Category::Inertia && effect.acts(stage));
         !effects.into_iter().any(|effect| effect.connectivity().iter().flatten().any(is_free))
+    }
+
+    /// True if joints and motors of a stage, none of them redundant, constrain as much as all its unknowns may
+    /// move.
+    pub fn lacks_freedom(&self, dof_map: &DofMap) -> bool {
+        let unknowns = |slot: usize| dof_map.of(slot as Slot).iter().filter(|&&number| number != DofMap::HELD).count();
+        let add = |sums: [usize; 2], (slot, kind): (usize, &SlotKind)| match kind.is_multiplier() {
+            true => [sums[0] + unknowns(slot), sums[1]],
+            false => [sums[0], sums[1] + unknowns(slot)],
+        };
+        let [constraints, motions] = self.kinds.iter().enumerate().fold([0; 2], add);
+        constraints == motions
     }
 
     /// The motors of joints that a change of amplitudes moves by more than a joint may be open.
@@ -386,10 +398,13 @@ impl Model {
 
     /// Coordinates that are driven from outside, each with the derivative of the energy over it, see
     /// [`DrivenCoordinates`](crate::effect::DrivenCoordinates).
-    pub fn drives(&self, state: &State, origin: Option<&State>) -> Vec<(f64, f64)> {
+    pub fn drives(&self, state: &State, origin: Option<&State>) -> Vec<Drive> {
         let mut all = Vec::new();
         let driven = self.effects.iter().filter_map(|effect| effect.roles().driven);
-        driven.for_each(|driven| driven.drives(state, origin, &mut |x, force| all.push((x, force))));
+        driven.for_each(|driven| {
+            let acts_at_once = driven.act_at_once();
+            driven.drives(state, origin, &mut |value, force| all.push(Drive { value, force, acts_at_once }));
+        });
         all
     }
 

@@ -311,6 +311,10 @@ impl Constraint for Joints {
 
 impl DrivenCoordinates for Joints {
     /// Multipliers are unknowns of linear stages, too.
+    fn act_at_once(&self) -> bool {
+        false
+    }
+
     fn drives(&self, at: &State, _origin: Option<&State>, show: &mut dyn FnMut(f64, f64)) {
         for joint in &self.joints {
             let Some((on, motor)) = joint.motor() else { continue };

@@ -1,6 +1,6 @@
 //! The energy account: what was stored, and the work that came in.
 
-use crate::effect::Energy;
+use crate::effect::{Drive, Energy};
 use crate::model::charts::HALF_TURN;
 use crate::model::{Assembly, LinearisedSystem, Model, SlotKind};
 use crate::rotation::{Rotation, log, unwound};
@@ -59,7 +59,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    fn drives(&self) -> Vec<(f64, f64)> {
+    fn drives(&self) -> Vec<Drive> {
         self.model.drives(self.state, self.linear.map(|linear| &linear.origin))
     }
 }
@@ -76,7 +76,7 @@ pub struct Bookkeeper {
     unwrapped: Vec<Vec3>,
     force: Vec<Vec3>,
     drag: Vec<Vec3>,
-    drives: Vec<(f64, f64)>,
+    drives: Vec<Drive>,
     /// The middle of the step that is booked next
     #[serde(skip)]
     middle: Waypoint,
@@ -89,7 +89,7 @@ struct Waypoint {
     q: Vec<Vec3>,
     force: Vec<Vec3>,
     drag: Vec<Vec3>,
-    drives: Vec<(f64, f64)>,
+    drives: Vec<Drive>,
 }
 
 impl Bookkeeper {
@@ -125,10 +125,15 @@ impl Bookkeeper {
         self.first = None;
     }
 
-    /// Opens a stage: energies are taken, no work is added.
+    /// Opens a stage: energies are taken, with the work of free strains that jump where it begins.
     pub fn open(&mut self, entry: Entry) {
         let Entry { state, system, .. } = entry;
-        self.drives = entry.drives();
+        let drives = entry.drives();
+        if self.first.is_some() {
+            let jumps = self.drives.iter().zip(&drives).filter(|(_, to)| to.acts_at_once);
+            self.ledger.external += jumps.map(|(from, to)| trapezoid(from, to)).sum::<f64>();
+        }
+        self.drives = drives;
         copy_outside(system, state.q.len(), &mut self.force);
         self.middle.is_passed = false;
         // Where nothing damps it is empty.
@@ -149,12 +154,12 @@ impl Bookkeeper {
         ledger.damped +=
             way.work(drag, through.map(|middle| &middle.drag[..]), |slot| system.part_of(Category::Damping, slot));
         let drives = entry.drives();
-        for (k, (&(x0, f0), &(x1, f1))) in self.drives.iter().zip(&drives).enumerate() {
+        for (k, (from, to)) in self.drives.iter().zip(&drives).enumerate() {
             ledger.external += match through.and_then(|middle| middle.drives.get(k)) {
-                None => 0.5 * (f0 + f1) * (x1 - x0),
-                Some(&(x, f)) => {
-                    let [before, within, after] = slopes(x - x0, x1 - x0);
-                    (f0 * before + 4.0 * f * within + f1 * after) / 6.0
+                None => trapezoid(from, to),
+                Some(middle) => {
+                    let [before, within, after] = slopes(middle.value - from.value, to.value - from.value);
+                    (from.force * before + 4.0 * middle.force * within + to.force * after) / 6.0
                 }
             };
         }
@@ -173,7 +178,7 @@ impl Bookkeeper {
     pub fn work_by_end_forces(&self, entry: Entry) -> f64 {
         let mut ahead = self.clone();
         ahead.force.fill(Vec3::ZERO);
-        ahead.drives.iter_mut().for_each(|(_, force)| *force = 0.0);
+        ahead.drives.iter_mut().for_each(|drive| drive.force = 0.0);
         ahead.add_step(entry);
         2.0 * (ahead.ledger.external - self.ledger.external)
     }
@@ -295,6 +300,11 @@ where
     T: Copy + Sub<Output = T> + Mul<f64, Output = T>,
 {
     [middle * 4.0 - end, end, end * 3.0 - middle * 4.0]
+}
+
+/// Work on a driven coordinate from one state to another, by the trapezoidal rule.
+fn trapezoid(from: &Drive, to: &Drive) -> f64 {
+    0.5 * (from.force + to.force) * (to.value - from.value)
 }
 
 /// Work of a force over the straight way of its unknown: by the trapezoidal rule, or by Simpson's

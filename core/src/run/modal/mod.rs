@@ -115,6 +115,9 @@ impl Modal<'_, '_> {
         let mut rigid = rigid_motions(assembly, model, state, &plan.places);
         rigid.extend(free_spins(&assembly.system, model, state));
         self.refuse_massless_mechanisms(matrices)?;
+        if self.stage.model.lacks_freedom(&self.stage.assembly.system.pattern.dof_map) {
+            return Err(self.nothing_moves());
+        }
         let has_layers = !self.stage.issued.layers && self.stage.may_have_layers();
         let moment = self.stage.moment();
         let StageRun { assembly, newton, observer, counters, number, plan, model, .. } = &mut *self.stage;
