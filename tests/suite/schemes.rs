@@ -1,6 +1,7 @@
 //! Time schemes: order two for all of them, through changes of chart, with equal and with alternating steps; adaptive steps.
 
-use crate::scenes::{distance, simulate};
+use crate::random::Random;
+use crate::scenes::{distance, list, simulate};
 use beamsim::scene;
 use beamsim_core::integrate::{Increments, Rotations, Scheme, Step};
 use beamsim_core::kernel::Weights;
@@ -1079,4 +1080,57 @@ fn velocities_of_round_off_are_no_jumps() {
     };
     assert_eq!(told("sin(t + pi/2) - 1"), Vec::<String>::new());
     assert!(told("1e-9*t")[0].contains("the velocity jumps"));
+}
+
+/// What has no mass is in balance where a dynamic stage begins. A massless bar in two halves holds a mass m at its end, and one
+/// half is heated at once: u = e L/2 (1 - cos(w t)), w^2 = EA/(m L). In random units and directions, with and without a static
+/// stage before, in which a support holds the middle of the heated bar; then it is released, with the same motion about its
+/// place.
+#[test]
+fn what_has_no_mass_begins_in_balance() {
+    let mut random = Random::new(101);
+    for number in 0..12 {
+        let [length, mass] = [0; 2].map(|_| 10.0_f64.powf(random.range(-3.0, 3.0)));
+        let (along, part) = (random.direction(), random.range(0.3, 0.7));
+        let (strain, frequency) = (1e-3 * random.range(0.2, 1.0), random.range(3.0, 20.0));
+        let stiffness = frequency * frequency * mass * length;
+        let is_released = number % 2 == 1;
+        let (held, begins) = match is_released {
+            true => {
+                ("[[support]]\nat = \"m\"\nfix = \"all\"\nstages = [1]\n", "[[stage]]\nkind = \"static\"\nsteps = 1\n")
+            }
+            false => ("", ""),
+        };
+        let deck = |scheme: &str, steps: f64| {
+            format!(
+                "[point]\na = [0, 0, 0]\nm = {}\nb = {}\n[section.s]\nEA = {stiffness:e}\nGA = {stiffness:e}\nGJ = {bending:e}\n\
+                 EI = {bending:e}\n[[beam]]\nname = \"hot\"\nsection = \"s\"\nthrough = [\"a\", \"m\"]\nelements = 1\n\
+                 free_strain = [{strain}, 0, 0, 0, 0, 0]\n[[beam]]\nname = \"cold\"\nsection = \"s\"\nthrough = [\"m\", \"b\"]\n\
+                 elements = 1\n[[body]]\nat = \"b\"\nmass = {mass:e}\n[[support]]\nat = \"a\"\nfix = \"all\"\n\
+                 [[support]]\nat = \"b\"\naxes = [{}, {}]\nfix = [\"uy\", \"uz\", \"rx\", \"ry\", \"rz\"]\n{held}{begins}\
+                 [[stage]]\nkind = \"dynamic\"\nend = {}\nstep = {:e}\nscheme = \"{scheme}\"\n\
+                 [output]\nnodes = [\"b\"]\ncolumns = [\"u\"]\n",
+                list(along * (part * length)),
+                list(along * length),
+                list(along),
+                list(along.cross(Vec3([0.3, -0.7, 0.5])).normalized().unwrap()),
+                4.0 / frequency,
+                1.0 / (steps * frequency),
+                bending = 1e-2 * stiffness * length * length,
+            )
+        };
+        let size = strain * part * length;
+        let error = |scheme: &str, steps: f64| {
+            let run = simulate(&deck(scheme, steps));
+            let way = run.vector("b.u");
+            let expected = size * (1.0 - 4.0_f64.cos());
+            let told: Vec<_> = run.counters.findings.warnings.iter().map(|warning| warning.kind).collect();
+            assert!(told.iter().all(|kind| *kind == WarningKind::LongSteps), "{told:?}\n{}", deck(scheme, steps));
+            (Vec3(way).dot(along) - expected).abs() / size
+        };
+        let [coarse, fine] = [20.0, 40.0].map(|steps| error("newmark", steps));
+        assert!(fine < 2e-3 && coarse > 3.5 * fine, "{number}: {coarse:e} {fine:e}");
+        let fourth = error("lobatto", 20.0);
+        assert!(fourth < 2e-6, "{number}: {fourth:e}");
+    }
 }

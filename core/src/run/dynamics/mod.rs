@@ -125,7 +125,6 @@ impl Dynamics<'_, '_> {
     /// Begins the stage.
     fn begin(&mut self) -> Result<StepsCheckpoint, Failure> {
         self.start()?;
-        self.find_rates();
         let start = self.stage.state.time;
         Ok(match self.settings.adaptive {
             None => {

@@ -3,7 +3,7 @@
 
 use super::Dynamics;
 use super::massless::Massless;
-use crate::integrate::Method;
+use crate::integrate::{Method, Scheme, Step};
 use crate::kernel::Weights;
 use crate::model::{LARGEST_GAP, SlotKind, StageError};
 use crate::run::energy::Entry;
@@ -15,6 +15,9 @@ use crate::system::{Slot, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
+
+/// The length of a step, over that of the first one, within which nothing that has mass moves.
+const INSTANT: f64 = 1e-4;
 
 /// Relative change of a velocity that is round-off.
 const ROUND_OFF: f64 = 1e-9;
@@ -38,6 +41,8 @@ impl Dynamics<'_, '_> {
         if let Some(contacts) = self.stage.model.contacts() {
             contacts.begin_motion(self.stage.state);
         }
+        self.find_rates();
+        self.settle_massless()?;
         self.solve_accelerations()?;
         let jerk = self.jerk_of_joints()?;
         self.start_scheme(jerk.as_ref());
@@ -221,6 +226,42 @@ impl Dynamics<'_, '_> {
                     self.stage.model.node_at(slot as usize)
                 )));
             }
+        }
+        Ok(())
+    }
+
+    /// What has neither mass nor damping is in balance from the first instant on, whatever loads, free strains and supports
+    /// begin there: it is where a step leads it that is too short for anything else to move.
+    fn settle_massless(&mut self) -> Result<(), Failure> {
+        let StageRun { assembly, newton, state, model, counters, bookkeeper, .. } = &mut *self.stage;
+        if self.rateless.is_empty() {
+            return Ok(());
+        }
+        assembly.forget();
+        assembly.evaluate(state, Weights::NONE, None);
+        let (system, dof_map) = (&assembly.system, &assembly.system.pattern.dof_map);
+        let out_of_balance = |&slot: &usize| {
+            let total = system.total(slot);
+            let free = (total - dof_map.held_part(slot as Slot, total)).norm();
+            if model.kinds[slot] == SlotKind::Rotation { free / model.length } else { free }
+        };
+        let largest = self.rateless.iter().map(out_of_balance).fold(0.0, f64::max);
+        if largest <= newton.convergence.tolerance * model.largest_force(system) {
+            return Ok(());
+        }
+        let before = State::clone(state);
+        let strain = Entry::new(model, state, assembly).strain();
+        state.v.fill(Vec3::ZERO);
+        let step = Step { scheme: Scheme::newmark(0.25, 0.5), length: INSTANT * self.settings.step };
+        match newton.solve(model, assembly, state, &step, None, &mut counters.work) {
+            Ok(()) => {
+                let State { v, a, .. } = before;
+                (state.v, state.a) = (v, a);
+                bookkeeper.shift(Entry::new(model, state, assembly).strain() - strain);
+            }
+            Err(NewtonFailure::Interrupted(signal)) => return Err(self.stage.stop(signal)),
+            // It moves in the first step.
+            Err(_) => state.copy_from(&before),
         }
         Ok(())
     }

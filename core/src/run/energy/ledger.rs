@@ -59,6 +59,11 @@ impl<'a> Entry<'a> {
         }
     }
 
+    /// The strain energy.
+    pub fn strain(&self) -> f64 {
+        self.energy().strain
+    }
+
     fn drives(&self) -> Vec<Drive> {
         self.model.drives(self.state, self.linear.map(|linear| &linear.origin))
     }
@@ -110,6 +115,14 @@ impl Bookkeeper {
     pub fn bring_in(&mut self, entry: Entry) {
         if let Some(first) = &mut self.first {
             *first += entry.energy().kinetic - self.ledger.kinetic;
+        }
+    }
+
+    /// The strain energy has changed by this where what has no mass came into balance at once: that belongs to the
+    /// account.
+    pub fn shift(&mut self, change: f64) {
+        if let Some(first) = &mut self.first {
+            *first += change;
         }
     }
 
