@@ -1134,3 +1134,51 @@ fn what_has_no_mass_begins_in_balance() {
         assert!(fourth < 2e-6, "{number}: {fourth:e}");
     }
 }
+
+/// Rotations with damping and without inertia begin with the rate of balance: a rod with GJ and the damping c GJ under a
+/// sudden torque M turns by r (1 - exp(-t/c)), r = M L/GJ. Where only another axis is damped it turns by r at once, and
+/// stays.
+#[test]
+fn what_has_damping_alone_begins_with_its_rate() {
+    let mut random = Random::new(102);
+    for number in 0..12 {
+        let length = 10.0_f64.powf(random.range(-3.0, 3.0));
+        let (along, turned, time) = (random.direction(), random.range(0.1, 0.5), random.range(0.05, 2.0));
+        let aside = along.cross(random.direction()).normalized().unwrap();
+        let torsion = 10.0 * length * length;
+        let run = |scheme: &str, steps: f64, damping: &str| {
+            simulate(&format!(
+                "[effects]\nlarge_rotations = {}\n[point]\na = [0, 0, 0]\nb = {}\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = {torsion:e}\n\
+                 EI = {bending:e}\nrhoA = 1\n[[beam]]\nname = \"p\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 4\n\
+                 [[support]]\nat = \"a\"\nfix = \"all\"\n{damping}[[load]]\nat = \"b\"\nmoment = {}\n\
+                 [[stage]]\nkind = \"dynamic\"\nend = {time:e}\nstep = {:e}\nscheme = \"{scheme}\"\n[output]\nnodes = [\"b\"]\ncolumns = [\"r\", \"w\"]\n",
+                number % 2 == 0,
+                list(along * length),
+                list(along * (turned * torsion / length)),
+                time / steps,
+                bending = 100.0 * torsion,
+            ))
+        };
+        let viscous = format!("[damping]\nstiffness = {time:e}\n");
+        let error = |scheme: &str, steps: f64| {
+            let expected = 1.0 - (-1.0_f64).exp();
+            (Vec3(run(scheme, steps, &viscous).vector("b.r")).dot(along) / turned - expected).abs()
+        };
+        let [coarse, fine] = [10.0, 20.0].map(|steps| error("newmark", steps));
+        assert!(fine < 5e-4 && coarse > 3.5 * fine, "{number}: {coarse:e} {fine:e}");
+        let fourth = error("lobatto", 10.0);
+        assert!(fourth < 2e-6, "{number}: {fourth:e}");
+        let damper = format!(
+            "[[spring]]\nat = \"b\"\naxes = [{}, {}]\ndamping = [0, 0, 0, {:e}, 0, 0]\n",
+            list(aside),
+            list(along.cross(aside)),
+            torsion / length
+        );
+        let held = run("newmark", 10.0, &damper);
+        let (place, rate) = (Vec3(held.vector("b.r")), Vec3(held.vector("b.w")));
+        assert!(
+            (place.dot(along) / turned - 1.0).abs() < 1e-6 && rate.norm() * time < 1e-2 * turned,
+            "{number}: {place:?} {rate:?}"
+        );
+    }
+}
