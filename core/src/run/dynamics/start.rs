@@ -257,8 +257,9 @@ impl Dynamics<'_, '_> {
     /// anything to move.
     fn settle_damped(&mut self) -> Result<(), Failure> {
         let kinds = &self.stage.model.kinds;
-        let has_damping_alone =
-            |slot: &usize| !self.massive[*slot] && !kinds[*slot].is_multiplier() && !self.rateless.contains(slot);
+        let has_damping_alone = |slot: &usize| {
+            !self.massive[*slot] && !kinds[*slot].is_multiplier() && self.rateless.binary_search(slot).is_err()
+        };
         let damped: Vec<usize> = (0..kinds.len()).filter(has_damping_alone).collect();
         if !self.is_off_balance(&damped) {
             return Ok(());
