@@ -7,6 +7,7 @@ mod friction_impulses;
 mod grid;
 mod judgement;
 mod massless;
+mod massless_start;
 mod middle;
 mod smooth_start;
 mod start;

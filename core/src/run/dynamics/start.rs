@@ -3,7 +3,7 @@
 
 use super::Dynamics;
 use super::massless::Massless;
-use crate::integrate::{Method, Scheme, Step};
+use crate::integrate::Method;
 use crate::kernel::Weights;
 use crate::model::{LARGEST_GAP, SlotKind, StageError};
 use crate::run::energy::Entry;
@@ -15,9 +15,6 @@ use crate::system::{Slot, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
-
-/// The length of a step, over that of the first one, within which nothing that has mass moves.
-const INSTANT: f64 = 1e-6;
 
 /// Relative change of a velocity that is round-off.
 const ROUND_OFF: f64 = 1e-9;
@@ -42,8 +39,7 @@ impl Dynamics<'_, '_> {
             contacts.begin_motion(self.stage.state);
         }
         self.find_rates();
-        self.settle_massless()?;
-        self.settle_damped()?;
+        self.balance_massless()?;
         self.solve_accelerations()?;
         let jerk = self.jerk_of_joints()?;
         self.start_scheme(jerk.as_ref());
@@ -229,89 +225,6 @@ impl Dynamics<'_, '_> {
             }
         }
         Ok(())
-    }
-
-    /// What has neither mass nor damping is in balance from the first instant on, whatever loads, free strains and supports
-    /// begin there: it is where a step leads it that is too short for anything else to move.
-    fn settle_massless(&mut self) -> Result<(), Failure> {
-        if !self.is_off_balance(&self.rateless.clone()) {
-            return Ok(());
-        }
-        let StageRun { assembly, state, model, .. } = &mut *self.stage;
-        let before = State::clone(state);
-        let strain = Entry::new(model, state, assembly).strain();
-        state.v.fill(Vec3::ZERO);
-        if self.takes_instant()? {
-            let StageRun { assembly, state, model, bookkeeper, .. } = &mut *self.stage;
-            let State { v, a, .. } = before;
-            (state.v, state.a) = (v, a);
-            bookkeeper.shift(Entry::new(model, state, assembly).strain() - strain);
-        } else {
-            // It moves in the first step.
-            self.stage.state.copy_from(&before);
-        }
-        Ok(())
-    }
-
-    /// What has damping and no mass begins with the rate by which damping balances all else: that of a step too short for
-    /// anything to move.
-    fn settle_damped(&mut self) -> Result<(), Failure> {
-        let kinds = &self.stage.model.kinds;
-        let has_damping_alone = |slot: &usize| {
-            !self.massive[*slot] && !kinds[*slot].is_multiplier() && self.rateless.binary_search(slot).is_err()
-        };
-        let damped: Vec<usize> = (0..kinds.len()).filter(has_damping_alone).collect();
-        if !self.is_off_balance(&damped) {
-            return Ok(());
-        }
-        // Along axes without damping they come into balance first.
-        let before = State::clone(self.stage.state);
-        if self.takes_instant()? {
-            let places: Vec<Vec3> = damped.iter().map(|&slot| self.stage.state.q[slot]).collect();
-            self.stage.state.copy_from(&before);
-            damped.iter().zip(places).for_each(|(&slot, place)| self.stage.state.q[slot] = place);
-        } else {
-            self.stage.state.copy_from(&before);
-            return Ok(());
-        }
-        let settled = State::clone(self.stage.state);
-        let takes_instant = self.takes_instant()?;
-        let rates: Vec<Vec3> = damped.iter().map(|&slot| self.stage.state.v[slot]).collect();
-        self.stage.state.copy_from(&settled);
-        if takes_instant {
-            damped.iter().zip(rates).for_each(|(&slot, rate)| self.stage.state.v[slot] = rate);
-        }
-        Ok(())
-    }
-
-    /// True if forces on some of these slots are out of balance at rest.
-    fn is_off_balance(&mut self, slots: &[usize]) -> bool {
-        let StageRun { assembly, newton, state, model, .. } = &mut *self.stage;
-        if slots.is_empty() {
-            return false;
-        }
-        assembly.forget();
-        assembly.evaluate(state, Weights::NONE, None);
-        let (system, dof_map) = (&assembly.system, &assembly.system.pattern.dof_map);
-        let out_of_balance = |&slot: &usize| {
-            let total = system.total(slot);
-            let free = (total - dof_map.held_part(slot as Slot, total)).norm();
-            if model.kinds[slot] == SlotKind::Rotation { free / model.length } else { free }
-        };
-        let largest = slots.iter().map(out_of_balance).fold(0.0, f64::max);
-        largest > newton.convergence.tolerance * model.largest_force(system)
-    }
-
-    /// A step too short for what has mass to move, by backward differences; `false` where it finds no balance.
-    fn takes_instant(&mut self) -> Result<bool, Failure> {
-        let step = Step { scheme: Scheme::newmark(1.0, 1.0), length: INSTANT * self.settings.step };
-        let StageRun { assembly, newton, state, model, counters, .. } = &mut *self.stage;
-        step.predict(state, step.length);
-        match newton.solve(model, assembly, state, &step, None, &mut counters.work) {
-            Ok(()) => Ok(true),
-            Err(NewtonFailure::Interrupted(signal)) => Err(self.stage.stop(signal)),
-            Err(_) => Ok(false),
-        }
     }
 
     fn solve_accelerations(&mut self) -> Result<(), Failure> {

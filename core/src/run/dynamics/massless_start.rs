@@ -1,0 +1,98 @@
+//! What no mass resists where a dynamic stage begins: it is in balance from the first instant on, whatever loads, free
+//! strains and supports begin there.
+//!
+//! Both places and rates are those at the end of a step that is too short for anything with mass to move.
+
+use super::Dynamics;
+use crate::integrate::{Scheme, Step};
+use crate::kernel::Weights;
+use crate::model::SlotKind;
+use crate::run::energy::Entry;
+use crate::run::failure::Failure;
+use crate::run::stage_run::StageRun;
+use crate::solve::NewtonFailure;
+use crate::system::{Slot, State};
+
+/// The length of that step, over that of the first one of the stage.
+const INSTANT: f64 = 1e-6;
+
+impl Dynamics<'_, '_> {
+    /// Puts what has neither mass nor damping where it is in balance, and gives what has damping alone the rate of
+    /// balance.
+    pub(super) fn balance_massless(&mut self) -> Result<(), Failure> {
+        // Rates by backward differences: none of those before matters.
+        let instant = Step { scheme: Scheme::newmark(1.0, 1.0), length: INSTANT * self.settings.step };
+        let damped = self.damped_alone();
+        let Self { stage, rateless, .. } = self;
+        put_in_balance(stage, rateless, &instant)?;
+        // Along axes without damping these come into balance first.
+        if put_in_balance(stage, &damped, &instant)? {
+            give_rates(stage, &damped, &instant)?;
+        }
+        Ok(())
+    }
+
+    /// The slots that have damping and no mass.
+    fn damped_alone(&self) -> Vec<usize> {
+        let kinds = &self.stage.model.kinds;
+        let is_one = |&slot: &usize| {
+            !self.massive[slot] && !kinds[slot].is_multiplier() && self.rateless.binary_search(&slot).is_err()
+        };
+        (0..kinds.len()).filter(is_one).collect()
+    }
+}
+
+/// Puts slots where they are in balance; `false` where they are, or where no balance is found: then they move in the first
+/// step.
+fn put_in_balance(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Result<bool, Failure> {
+    if !is_off_balance(stage, slots) {
+        return Ok(false);
+    }
+    let Some(after) = state_after(stage, instant)? else { return Ok(false) };
+    let StageRun { assembly, state, model, bookkeeper, .. } = stage;
+    let strain = Entry::new(model, state, assembly).strain();
+    slots.iter().for_each(|&slot| state.q[slot] = after.q[slot]);
+    assembly.evaluate(state, Weights::NONE, None);
+    bookkeeper.shift(Entry::new(model, state, assembly).strain() - strain);
+    Ok(true)
+}
+
+/// Gives slots the rates of balance, if one is found.
+fn give_rates(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Result<(), Failure> {
+    if let Some(after) = state_after(stage, instant)? {
+        slots.iter().for_each(|&slot| stage.state.v[slot] = after.v[slot]);
+    }
+    Ok(())
+}
+
+/// True if forces on some of these slots are out of balance.
+fn is_off_balance(stage: &mut StageRun, slots: &[usize]) -> bool {
+    if slots.is_empty() {
+        return false;
+    }
+    let StageRun { assembly, newton, state, model, .. } = stage;
+    assembly.forget();
+    assembly.evaluate(state, Weights::NONE, None);
+    let (system, dof_map) = (&assembly.system, &assembly.system.pattern.dof_map);
+    let out_of_balance = |&slot: &usize| {
+        let total = system.total(slot);
+        let free = (total - dof_map.held_part(slot as Slot, total)).norm();
+        if model.kinds[slot] == SlotKind::Rotation { free / model.length } else { free }
+    };
+    let largest = slots.iter().map(out_of_balance).fold(0.0, f64::max);
+    largest > newton.convergence.tolerance * model.largest_force(system)
+}
+
+/// The state at the end of a step from the present one, which stays; `None` where no balance is found.
+fn state_after(stage: &mut StageRun, step: &Step) -> Result<Option<State>, Failure> {
+    let before = State::clone(stage.state);
+    step.predict(stage.state, step.length);
+    let StageRun { assembly, newton, state, model, counters, .. } = stage;
+    let solved = newton.solve(model, assembly, state, step, None, &mut counters.work);
+    let after = std::mem::replace(*state, before);
+    match solved {
+        Ok(()) => Ok(Some(after)),
+        Err(NewtonFailure::Interrupted(signal)) => Err(stage.stop(signal)),
+        Err(_) => Ok(None),
+    }
+}
