@@ -48,7 +48,9 @@ fn put_in_balance(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Resu
     if !is_off_balance(stage, slots) {
         return Ok(false);
     }
-    let Some(after) = state_after(stage, instant)? else { return Ok(false) };
+    // What has mass stays where it is.
+    let start = stage.state.at_rest().into_owned();
+    let Some(after) = state_after(stage, start, instant)? else { return Ok(false) };
     let StageRun { assembly, state, model, bookkeeper, .. } = stage;
     let strain = Entry::new(model, state, assembly).strain();
     slots.iter().for_each(|&slot| state.q[slot] = after.q[slot]);
@@ -59,7 +61,8 @@ fn put_in_balance(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Resu
 
 /// Gives slots the rates of balance, if one is found.
 fn give_rates(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Result<(), Failure> {
-    if let Some(after) = state_after(stage, instant)? {
+    let start = State::clone(stage.state);
+    if let Some(after) = state_after(stage, start, instant)? {
         slots.iter().for_each(|&slot| stage.state.v[slot] = after.v[slot]);
     }
     Ok(())
@@ -83,11 +86,11 @@ fn is_off_balance(stage: &mut StageRun, slots: &[usize]) -> bool {
     largest > newton.convergence.tolerance * model.largest_force(system)
 }
 
-/// The state at the end of a step from the present one, which stays; `None` where no balance is found.
-fn state_after(stage: &mut StageRun, step: &Step) -> Result<Option<State>, Failure> {
-    let before = State::clone(stage.state);
-    step.predict(stage.state, step.length);
+/// The state at the end of a step from `start`; `None` where no balance is found. That of the stage stays.
+fn state_after(stage: &mut StageRun, start: State, step: &Step) -> Result<Option<State>, Failure> {
     let StageRun { assembly, newton, state, model, counters, .. } = stage;
+    let before = std::mem::replace(*state, start);
+    step.predict(state, step.length);
     let solved = newton.solve(model, assembly, state, step, None, &mut counters.work);
     let after = std::mem::replace(*state, before);
     match solved {
