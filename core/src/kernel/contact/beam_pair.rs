@@ -8,8 +8,10 @@
 //! y = Q^T D,  m = y/l,  H = (I - mm)/l,  dy = Q^T dD + y~ w,  w = T_j dP_j
 //! arms       a_A = r_A + g/2,  a_B = r_B + g/2
 //! rolling    Theta = a_A theta_A + a_B theta_B
-//! sliding    a = y - y0 - Theta x m,   da = dy - dy0 + m~ dTheta - Theta~ H dy
+//! sliding    a = y - y0 - Theta x mr,   da = dy - dy0 + mr~ dTheta - Theta~ (dmr/dm) H dy
 //! ```
+//!
+//! with mr = (m0 + m)/2 of the normals at both ends of the step, or m where the contact was open.
 //!
 //! With F = p m + t (force on A), internal forces are
 //!
@@ -134,7 +136,7 @@ pub fn add_pair<const NA: usize, const NB: usize, T: Real>(
         let before = turned_a.before(&a.shape.values) - turned_b.before(&b.shape.values);
         angles = turned_a.angle + turned_b.angle;
         rolling = turned_a.angle * arms[0] + turned_b.angle * arms[1];
-        let sliding = place - before - rolling.cross(normal);
+        let sliding = place - before - rolling.cross(law.carried.rolling_normal(normal).value);
         state.traction = friction.traction(&law.carried, normal, normal_force.force, sliding);
     }
     let pair = Pair { a, b, law, q, place, normal, curvature, rate, arms, turned, angles, rolling, state: &state };
@@ -212,12 +214,13 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         let p = self.state.normal_force.force;
         let weight = self.law.weight;
         let half = m.scale(0.5);
-        let slides = Mat3::identity() - Mat3::skew_mul(self.rolling, self.curvature)
-            + Mat3::skew_mul(m, self.angles.outer(half));
+        let rolls_about = self.law.carried.rolling_normal(m);
+        let slides = Mat3::identity() - Mat3::skew_mul(self.rolling, self.curvature) * rolls_about.over_normal
+            + Mat3::skew_mul(rolls_about.value, self.angles.outer(half));
         let friction = Derived {
             value: t.force.scale(weight),
             over_place: (t.over_sliding * slides + t.over_normal * self.curvature).scale(weight),
-            over_rolling: (t.over_sliding * m.skew()).scale(weight),
+            over_rolling: (t.over_sliding * rolls_about.value.skew()).scale(weight),
             over_before: -t.over_sliding.scale(weight),
             over_pressure: t.over_pressure.scale(weight),
         };

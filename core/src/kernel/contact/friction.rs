@@ -70,6 +70,15 @@ impl CarriedTraction {
         Turn::new(self.normal, n).of(self.force).value
     }
 
+    /// The normal about which a contact has rolled to the normal n since then: the mean of both. Where it was open, n.
+    pub fn rolling_normal<T: Real>(&self, n: Vec3<T>) -> RollingNormal<T> {
+        if self.normal == Vec3::ZERO {
+            return RollingNormal { value: n, over_normal: T::one() };
+        }
+        let half = T::constant(0.5);
+        RollingNormal { value: (Vec3::constant(self.normal) + n) * half, over_normal: half }
+    }
+
     /// It in other axes.
     pub fn turned(&self, rotation: &Mat3) -> Self {
         let [force, normal] = [self.force, self.normal].map(|vector| *rotation * vector);
@@ -87,6 +96,14 @@ impl CarriedTraction {
         }
         Self { force: self.force + other.carried_to(self.normal), slides: self.slides && other.slides, ..self }
     }
+}
+
+/// The normal about which a contact rolls over a step.
+#[derive(Clone, Copy, Debug)]
+pub struct RollingNormal<T> {
+    pub(crate) value: Vec3<T>,
+    /// Its derivative over the normal at the end of the step, times the identity
+    pub(crate) over_normal: T,
 }
 
 /// The smallest rotation n0 -> n, of vectors normal to n0.

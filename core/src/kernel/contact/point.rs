@@ -21,13 +21,16 @@
 //! the last converged state, for the same material point then and now, is
 //!
 //! ```text
-//! a = y - y0 - r theta x n,   y0 = sum N_i y0_i,   theta = sum N_i log(S_i S0_i^T)
+//! a = y - y0 - r theta x nr,   y0 = sum N_i y0_i,   theta = sum N_i log(S_i S0_i^T)
 //! ```
+//!
+//! with nr = (n0 + n)/2 of the normals at both ends, or n where the contact was open: with n alone the
+//! way of a ball that rolls on a curved surface would be wrong to first order of the step.
 //!
 //! The tangent, with dtheta_i = T(theta_i)^-T W_i:
 //!
 //! ```text
-//! dn = H dy,  dp = p_g n.dy,  da = dy + r n~ dtheta - r theta~ dn
+//! dn = H dy,  dp = p_g n.dy,  da = dy + r nr~ dtheta - r theta~ dnr
 //! dF = n dp + p dn + dt,      dm = -t~ dn + n~ dt
 //! K_x_i = -N_i Q (dF - F~ T_s dP_s)
 //! K_P_i = N_i r [T_i^T S_i^T (dm + m~ W_i) + C2_i(S_i^T m) on dP_i]
@@ -194,7 +197,7 @@ pub fn add_point<const N: usize, T: Real>(
         None => Point { nodes, shape, carrier, distance, law, seen, turned: None, state: &state }.add(weights, out),
         Some((friction, turning)) => {
             let turned = &Turned::new(turning, shape, &carrier.rotation.r);
-            let rolled = turned.angle.cross(distance.normal).scale(law.radius);
+            let rolled = turned.angle.cross(law.carried.rolling_normal(distance.normal).value).scale(law.radius);
             let sliding = seen.place - turned.before(&shape.values) - rolled;
             state.traction = friction.traction(&law.carried, distance.normal, normal_force.force, sliding);
             let turned = Some(turned);
@@ -291,18 +294,19 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         }
     }
 
-    /// t, with da = dy - dy0 + r n~ dtheta - r theta~ H dy; zero without friction.
+    /// t, with da = dy - dy0 + r nr~ dtheta - r theta~ (dnr/dn) H dy; zero without friction.
     fn traction(&self) -> Derived<T> {
         let Some(turned) = self.turned else { return Derived::zero() };
         let t = &self.state.traction;
         let ContactLaw { radius: r, weight, .. } = *self.law;
         let n = self.distance.normal;
         let curvature = self.distance.curvature;
-        let slides = Mat3::identity() - Mat3::skew_mul(turned.angle, curvature).scale(r);
+        let rolls_about = self.law.carried.rolling_normal(n);
+        let slides = Mat3::identity() - Mat3::skew_mul(turned.angle.scale(r), curvature) * rolls_about.over_normal;
         Derived {
             value: t.force.scale(weight),
             over_place: (t.over_sliding * slides + t.over_normal * curvature).scale(weight),
-            over_rolling: (t.over_sliding * n.skew()).scale(weight),
+            over_rolling: (t.over_sliding * rolls_about.value.skew()).scale(weight),
             over_before: -t.over_sliding.scale(weight),
             over_pressure: t.over_pressure.scale(weight),
         }
