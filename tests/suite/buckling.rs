@@ -1,7 +1,7 @@
 //! Critical loads on the paths of buckling stages: one row for each point.
 
 use crate::random::Random;
-use crate::scenes::{list, results, simulate};
+use crate::scenes::{attempt, list, results, simulate};
 use beamsim_core::run::{CriticalKind, CriticalLoad, StageResult};
 use beamsim_core::tensor::Vec3;
 use std::fs;
@@ -448,6 +448,27 @@ fn motions_go_on_behind_an_analysis_of_the_present_state() {
             let found = stages(&format!("[[stage]]\nkind = \"{between}\"\nmodes = 1\n"), cut);
             let off = exact.iter().zip(&found).map(|(a, b)| (a - b).abs() / (1.0 + a.abs())).fold(0.0, f64::max);
             assert!(off < 1e-9, "{between} at {cut}: {off}, {found:?} for {exact:?}");
+        }
+    }
+}
+
+/// A bar that heat makes longer without any stress bears every temperature.
+#[test]
+fn what_is_never_stressed_has_no_critical_load() {
+    let random = &mut Random::new(19);
+    for held in ["fix = \"all\"\n", "fix = \"pin\"\n[[support]]\nat = \"b\"\nfix = [\"uy\", \"uz\", \"rx\"]\n"] {
+        for order in 1..=3 {
+            let strain = 10.0_f64.powf(random.range(-6.0, -1.0));
+            let text = format!(
+                "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 10\nEI = 10\n\
+                 [[beam]]\nname = \"bar\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 4\norder = {order}\n\
+                 free_strain = [{strain:e}, 0, 0, 0, 0, 0]\n[[support]]\nat = \"a\"\n{held}\
+                 [[stage]]\nkind = \"buckling\"\nmodes = 1\n[output]\nnodes = [\"b\"]\n"
+            );
+            let run = attempt(&text);
+            let why = run.result.expect_err(&text).to_string();
+            assert!(why.contains("no load factor is found"), "{why}\n{text}");
+            assert!(run.counters.work.iterations < 2000, "{} iterations\n{text}", run.counters.work.iterations);
         }
     }
 }

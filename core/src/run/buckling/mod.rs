@@ -60,6 +60,12 @@ const LIKE_KNOWN: f64 = 2e-2;
 /// 1600 times the whole motion to it.
 const STANDS_STILL: f64 = 1e-2;
 
+/// The path is followed as far as this, in lengths of the scene.
+const FARTHEST: f64 = 100.0;
+/// Where nothing was found so far, the difference from 1 of the drift of an extrapolated load that keeps its distance from
+/// the load from which it is seen: what heat makes longer without stress gives way only because it becomes long.
+const KEEPS_DISTANCE: f64 = 1e-3;
+
 /// The message about a scene without critical loads.
 const NOTHING_BUCKLES: &str = "no load factor is found at which the scene loses its stiffness: its loads do not reduce \
                                it, or they are of a kind that makes vibrations grow (follower loads, moments fixed in \
@@ -95,6 +101,21 @@ impl Found {
     fn of_the_perfect(load: f64) -> Self {
         Self { critical: CriticalLoad { load, kind: CriticalKind::Estimate }, behind: Behind::Imperfect }
     }
+}
+
+/// How far a path was followed.
+enum Followed {
+    /// To a critical load
+    To(Found),
+    /// Far past where one was seen, to this load
+    Far(f64),
+}
+
+/// A critical load as the tangent at smaller loads foresees it.
+struct Extrapolation {
+    load: f64,
+    /// How fast it moves with the load from which it is seen
+    drift: f64,
 }
 
 /// A critical load that is searched.
@@ -187,9 +208,6 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         let moving = self.stand_still()?;
         let load = self.stage.state.load;
         let loads = critical_loads(self.stage, self.modes)?;
-        if loads.is_empty() {
-            return Err(Failure::Deck(format!("stage {}: {NOTHING_BUCKLES}", self.stage.number + 1)));
-        }
         let start = self.stage.state.clone();
         // Next to a critical load round-off moves the scene along; the load itself is closed in by
         // pivots.
@@ -197,6 +215,9 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         let (above, below): (Vec<f64>, Vec<f64>) = loads.into_iter().partition(|&critical| critical > load);
         let mut found = self.find_all(&above, &start)?;
         found.extend(self.find_all(&below, &start)?);
+        if found.is_empty() {
+            return Err(Failure::Deck(format!("stage {}: {NOTHING_BUCKLES}", self.stage.number + 1)));
+        }
         self.stage.counters.work.uncertainty = uncertainty;
         sort_by(&mut found, |a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
         self.stage.counters.steps += 1;
@@ -227,11 +248,11 @@ impl Buckling<'_, '_> {
     }
 
     /// The critical loads on one side of the present one that look from the start like these, up to a limit point
-    /// that ends the path.
+    /// that ends the path, or to one that is not there.
     fn find_all(&mut self, loads: &[f64], start: &State) -> Result<Vec<CriticalLoad>, Failure> {
         let mut so_far = SoFar::default();
         for (number, &seen) in loads.iter().enumerate() {
-            let next = self.find(loads, number, start, &so_far)?;
+            let Some(next) = self.find(loads, number, start, &so_far)? else { break };
             so_far.limit = so_far.limit.after(&next);
             if so_far.limit == PathLimit::Reached {
                 break;
@@ -243,26 +264,43 @@ impl Buckling<'_, '_> {
     }
 
     /// The critical load that looks from the start as number `number` of these, behind those that were found so
-    /// far. The state is then the start again.
-    fn find(&mut self, loads: &[f64], number: usize, start: &State, so_far: &SoFar) -> Result<Found, Failure> {
+    /// far; `None` if it only looks so. The state is then the start again.
+    fn find(&mut self, loads: &[f64], number: usize, start: &State, so_far: &SoFar) -> Result<Option<Found>, Failure> {
         let aim = Aim { sight: Sight { from: start.load, critical: loads[number] }, before: number, nearest: loads[0] };
         if so_far.limit == PathLimit::Imperfect {
             let seen = self.sights(&aim)?;
             self.stage.go_back_to(start)?;
-            return Ok(Found::of_the_perfect(seen[seen.len() - 1].critical));
+            return Ok(Some(Found::of_the_perfect(seen[seen.len() - 1].critical)));
         }
         // The look from the start is as much work as a search.
         let count = loads.len() as f64;
         let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
-        let mut found = self.follow(loads[number], number, &so_far.found, &done)?;
+        let followed = self.follow(loads[number], number, &so_far.found, &done)?;
         self.stage.go_back_to(start)?;
+        let mut found = match followed {
+            Followed::To(found) => found,
+            Followed::Far(load) => return self.foresee(&aim, load, start),
+        };
         if found.critical.kind == CriticalKind::Estimate {
-            found.critical.load = self.extrapolate(loads[number], number)?.unwrap_or(found.critical.load);
+            let seen = self.extrapolate(loads[number], number)?;
+            found.critical.load = seen.map_or(found.critical.load, |seen| seen.load);
         } else if let Some(perfect) = self.imperfect(&found, &aim, so_far)? {
             found = perfect;
         }
         self.stage.go_back_to(start)?;
-        Ok(found)
+        Ok(Some(found))
+    }
+
+    /// The critical load of a structure that an imperfection lets deflect without end, up to a load; `None` where smaller
+    /// loads do not foresee it either.
+    fn foresee(&mut self, aim: &Aim, followed_to: f64, start: &State) -> Result<Option<Found>, Failure> {
+        let seen = self.extrapolate(aim.sight.critical, aim.before)?;
+        let seen = seen.filter(|seen| (seen.drift - 1.0).abs() > KEEPS_DISTANCE);
+        self.stage.go_back_to(start)?;
+        if seen.is_some() {
+            self.warn_of_estimate(followed_to, None);
+        }
+        Ok(seen.map(|seen| Found::of_the_perfect(seen.load)))
     }
 
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative.
@@ -274,10 +312,11 @@ impl Buckling<'_, '_> {
         before: usize,
         known: &[CriticalLoad],
         done: &dyn Fn(f64) -> f64,
-    ) -> Result<Found, Failure> {
+    ) -> Result<Followed, Failure> {
+        let start = self.stage.state.clone();
         let at_start = self.response()?;
         let none = negative_pivots(self.stage);
-        let mut search = CriticalSearch::new(self.stage.state.clone(), estimate);
+        let mut search = CriticalSearch::new(start.clone(), estimate);
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
                 let ended = search.ended.is_some();
@@ -293,9 +332,12 @@ impl Buckling<'_, '_> {
                     let kind = if goes_on { CriticalKind::Branch } else { self.kind_of_critical(&at_start)? };
                     let ends_path = ended && (goes_on || kind == CriticalKind::Limit);
                     let behind = if ends_path { Behind::Ends } else { Behind::GoesOn };
-                    return Ok(Found { critical: CriticalLoad { load: found, kind }, behind });
+                    return Ok(Followed::To(Found { critical: CriticalLoad { load: found, kind }, behind }));
                 }
                 break;
+            }
+            if distance(self.stage.model, &start, &search.here) > FARTHEST {
+                return Ok(Followed::Far(search.here.load));
             }
             let target = search.target();
             self.stage.go_back_to(&search.here)?;
@@ -310,7 +352,7 @@ impl Buckling<'_, '_> {
             let Some(passed) = none.zip(count).map(|(none, count)| count.saturating_sub(none)) else {
                 // Without a count of pivots the tangent itself must do.
                 self.stage.go_back_to(&search.here)?;
-                return self.follow_nearest(search.estimate, before, known, done);
+                return self.follow_nearest(search.estimate, before, known, done).map(Followed::To);
             };
             if passed > before {
                 search.close_at(target, self.stage.state.clone());
@@ -320,10 +362,10 @@ impl Buckling<'_, '_> {
             }
         }
         self.warn_of_estimate(search.here.load, search.ended);
-        Ok(match search.ended {
+        Ok(Followed::To(match search.ended {
             Some(Walked::TooCoarse) => Found::on_the_way(search.estimate, CriticalKind::Estimate),
             None | Some(Walked::There | Walked::Short) => Found::of_the_perfect(search.estimate),
-        })
+        }))
     }
 
     /// True if the load is no critical one: the tangent next to it does not foresee it, and the search goes on from the
@@ -385,18 +427,18 @@ impl Buckling<'_, '_> {
     /// its tangent looks like that of the perfect one: there the load at which it seems to be
     /// singular does not move, until the imperfection is felt. That load, of the critical load with
     /// `before` others below it; `None` where nothing is seen.
-    fn extrapolate(&mut self, first: f64, before: usize) -> Result<Option<f64>, Failure> {
+    fn extrapolate(&mut self, first: f64, before: usize) -> Result<Option<Extrapolation>, Failure> {
         let way = (first - self.stage.state.load).signum();
         let mut last: Option<Sight> = None;
-        let (mut least_drift, mut steadiest) = (f64::INFINITY, None);
+        let mut steadiest: Option<Extrapolation> = None;
         for _ in 0..MOST_EXTRAPOLATIONS {
             let load = self.stage.state.load;
             let Some(critical) = next_critical_load(self.stage, way, before)? else { break };
             let now = Sight { from: load, critical };
             let drift = last.as_ref().map_or(f64::MAX, |last| now.drift_since(last));
-            if drift < least_drift {
-                least_drift = drift;
-                steadiest = Some(last.map_or(critical, |last| 0.5 * (critical + last.critical)));
+            if steadiest.as_ref().is_none_or(|steadiest| drift < steadiest.drift) {
+                let load = last.map_or(critical, |last| 0.5 * (critical + last.critical));
+                steadiest = Some(Extrapolation { load, drift });
             }
             last = Some(now);
             if (critical - load).abs() < NEAREST_EXTRAPOLATION * critical.abs() {
