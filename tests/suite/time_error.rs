@@ -1,6 +1,7 @@
 //! What dynamic stages of fixed steps know of their error, and what they tell of it.
 
 use super::folder::{Folder, last_line, status};
+use crate::random::Random;
 use crate::scenes::{Simulation, simulate};
 use beamsim::output::HistoryReader;
 use beamsim_core::integrate::Largest;
@@ -469,4 +470,83 @@ fn an_accuracy_is_reached_with_cables_that_become_taut() {
             }
         }
     }
+}
+
+/// The quaternions of a node, row by row.
+fn quaternions(simulation: &Simulation, node: &str) -> Vec<[f64; 4]> {
+    let parts = ["qw", "qx", "qy", "qz"].map(|name| simulation.column(&format!("{node}.{name}")));
+    (0..parts[0].len()).map(|row| std::array::from_fn(|k| parts[k][row])).collect()
+}
+
+/// The largest angle between the rotations of a node in two runs, the second with `stride` times as many steps.
+fn largest_angle(of: &Simulation, exact: &Simulation, node: &str, stride: usize) -> f64 {
+    let exact = quaternions(exact, node);
+    let angle = |(row, q): (usize, [f64; 4])| {
+        let cosine: f64 = q.iter().zip(exact[row * stride]).map(|(a, b)| a * b).sum();
+        2.0 * cosine.abs().min(1.0).acos()
+    };
+    quaternions(of, node).into_iter().enumerate().map(angle).fold(0.0, f64::max)
+}
+
+/// Moments change how free spins turn the axes of a body within steps of increments.
+#[test]
+fn errors_of_heavy_tops_are_known() {
+    let random = &mut Random::new(41);
+    for _ in 0..6 {
+        let [inertia, spin] = [
+            [0, 1, 2].map(|_| random.range(0.05, 0.08)),
+            [random.range(-3.0, 3.0), random.range(-3.0, 3.0), random.range(5.0, 17.0)],
+        ];
+        let offset = [random.range(-0.1, 0.1), random.range(-0.1, 0.1), random.range(0.05, 0.3)];
+        let top = |scheme: &str, step: f64| {
+            simulate(&format!(
+                "gravity = [0, 0, -9.81]\n[point]\np = [0, 0, 0]\n[[body]]\nat = \"p\"\nmass = 1.3\ninertia = {inertia:?}\n\
+                 offset = {offset:?}\n[[support]]\nat = \"p\"\nfix = \"pin\"\n[[initial]]\nat = \"p\"\nspin = {spin:?}\n\
+                 [output]\nnodes = [\"p\"]\ncolumns = [\"q\"]\n\
+                 [[stage]]\nkind = \"dynamic\"\nend = 2\nstep = {step}\nscheme = \"{scheme}\"\n"
+            ))
+        };
+        let exact = top("lobatto", 1e-3);
+        for (scheme, allowed) in [("lie_generalized_alpha", 0.5..4.0), ("newmark", 0.45..4.0)] {
+            let run = top(scheme, 5e-3);
+            let [error, estimate] = [largest_angle(&run, &exact, "p", 5), estimated(&run).rotation];
+            assert!(allowed.contains(&(estimate / error)), "{scheme}: {estimate} for {error}, {inertia:?} {spin:?}");
+        }
+    }
+}
+
+/// A pendulum of one body errs by as much whatever moves beside it: its mass centre swings, its node stands still.
+#[test]
+fn errors_of_mass_centres_are_told() {
+    let pendulum = |more: &str, step: f64| {
+        simulate(&format!(
+            "gravity = [0, 0, -9.81]\n[point]\np = [0, 0, 0]\nq = [5, 0, 0]\n\
+             [[body]]\nat = \"p\"\nmass = 1\ninertia = [0.005, 0.005, 0.005]\noffset = [0.3, 0, 0]\n\
+             [[support]]\nat = \"p\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n{more}\
+             [output]\nnodes = [\"p\"]\ncolumns = [\"q\"]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 6\nstep = {step}\nscheme = \"newmark\"\n"
+        ))
+    };
+    let drifts = "[[body]]\nat = \"q\"\nmass = 1\n[[support]]\nat = \"q\"\nfix = [\"uy\", \"uz\"]\n\
+                  [[initial]]\nat = \"q\"\nvelocity = [0.01, 0, 0]\n";
+    for more in ["", drifts] {
+        let [coarse, fine] = [0.05, 0.0025].map(|step| pendulum(more, step));
+        assert_eq!(doubts(&coarse), [WarningKind::LongSteps], "{more}");
+        assert!(estimated(&coarse).displacement > 0.03 * 0.6 && doubts(&fine).is_empty(), "{:?}", estimated(&fine));
+    }
+}
+
+/// What has no inertia follows what has: rotations of a bar without rotary inertia that falls on a floor.
+#[test]
+fn rotations_without_inertia_have_no_error_of_their_own() {
+    let run = simulate(
+        "gravity = [0, 0, -9.81]\n[point]\na = [0, 0, 0.01]\nb = [1, 0, 0.11]\n\
+         [section.s]\nEA = 1e5\nGA = 1e5\nGJ = 1e3\nEI = 2e3\nrhoA = 1\n\
+         [[beam]]\nname = \"l\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 6\n\
+         [[surface]]\nname = \"floor\"\nkind = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n\
+         [[contact]]\nname = \"f\"\nbeams = [\"l\"]\nsurfaces = [\"floor\"]\nradius = 0.01\nstiffness = 1e6\ndamping = 1\n\
+         [damping]\nstiffness = 1e-4\n[[stage]]\nkind = \"dynamic\"\nend = 0.3\nstep = 1e-4\n[output]\nnodes = [\"a\"]\n",
+    );
+    assert!(estimated(&run).rotation < 0.1, "{:?}", estimated(&run));
+    assert!(!doubts(&run).contains(&WarningKind::LongSteps), "{:?}", doubts(&run));
 }

@@ -40,12 +40,12 @@
 //! slopes over several steps do not see it.
 
 use super::alpha::LOBATTO_ERROR;
-use super::time_error::{Correct, Largest, Scene, StepEnds, is_to_switch};
+use super::time_error::{Correct, Largest, MassCentre, Scene, StepEnds, is_to_switch};
 use super::{Increments, Method, Scheme, Stages, Step};
 use crate::kernel::Weights;
 use crate::kernel::turn::{StartChange, Stretch, Turn};
 use crate::model::{Assembly, SlotKind};
-use crate::rotation::{Complement, Rotation, log};
+use crate::rotation::{Complement, Rotation, log, relative_angle};
 use crate::system::{Category, DofMap, Field, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
@@ -58,6 +58,9 @@ pub(super) const SLOPE_STEPS: usize = 4;
 /// The local error of a step of increments over h^4 w^2 times the change of the acceleration of a
 /// free spin; without unit, measured on bodies that turn about their intermediate principal axes.
 pub(super) const FREE_SPIN_ERROR: f64 = 1.0 / 8.0;
+
+/// The error of a rotation, in radians, that is not compared with how far it has turned.
+const SMALL_ANGLE: f64 = 0.1;
 
 /// The size of the error, in radians or over the length of the scene, to which the carried error is
 /// scaled for a difference quotient of the forces of rates.
@@ -80,6 +83,8 @@ const RINGING_SHARE: f64 = 0.05;
 pub(super) struct CarriedError {
     #[serde(skip)]
     pub(super) kinds: Arc<Vec<SlotKind>>,
+    #[serde(skip)]
+    pub(super) centres: Arc<Vec<MassCentre>>,
     length: f64,
     slots: Vec<SlotError>,
     step: Step,
@@ -176,6 +181,17 @@ impl SlotError {
         }
     }
 
+    /// The size of the error of a rotation that is now `q`, but no more than twice what it has turned: a linear equation does not
+    /// know that what turns to and fro errs by no more.
+    #[inline(always)]
+    fn no_larger_than_turned(&self, error: Vec3, q: Vec3) -> f64 {
+        let size = error.norm();
+        if size <= SMALL_ANGLE {
+            return size;
+        }
+        size.min(2.0 * relative_angle(Rotation::new(self.start).r, Rotation::new(q).r))
+    }
+
     /// A step of a rotation that starts with `part` times the error, and the increment with which
     /// it ends at the end of the step without error, whose increment is `x`.
     fn changed(&self, turn: &Turn, x: Vec3, stretch: Stretch, part: f64) -> (Turn, Vec3) {
@@ -196,6 +212,7 @@ impl CarriedError {
         let of_slot = |slot: usize| SlotError { moves: scene.moves(slot), start: start[slot], ..SlotError::default() };
         Self {
             kinds: scene.kinds.clone(),
+            centres: scene.centres.clone(),
             length: scene.length,
             slots: threads::list(scene.kinds.len(), of_slot),
             before: step.length,
@@ -384,6 +401,7 @@ impl CarriedError {
         let Self { kinds, slots, step, .. } = self;
         let work = |(number, part): (usize, &mut [SlotError])| {
             let mut largest = Largest::default();
+            let mut told_angle = 0.0f64;
             let mut sizes = [Largest::default(); 2];
             for (k, slot) in (PART * number..).zip(part) {
                 let kind = kinds[k];
@@ -418,18 +436,28 @@ impl CarriedError {
                 }
                 let moved = if kind == SlotKind::Displacement { to.q[k] - slot.start } else { Vec3::ZERO };
                 largest.take(kind, now, moved);
+                if kind == SlotKind::Rotation && slot.moves {
+                    told_angle = told_angle.max(slot.no_larger_than_turned(now, to.q[k]));
+                }
             }
-            (largest, sizes)
+            (largest, told_angle, sizes)
         };
         let mut now = Largest::default();
+        let mut told_angle = 0.0f64;
         let mut sizes = [Largest::default(); 2];
-        let gather = |(largest, [all, ringing]): (Largest, [Largest; 2])| {
+        let gather = |(largest, angle, [all, ringing]): (Largest, f64, [Largest; 2])| {
             now = now.or(largest);
+            told_angle = told_angle.max(angle);
             sizes = [sizes[0].or(all), sizes[1].or(ringing)];
         };
         threads::in_order(slots.chunks_mut(PART).enumerate(), work, gather);
         if let Some(increments) = increments {
-            self.end_turns(increments, step_ends, &local, &mut now, &mut sizes);
+            let angle = self.end_turns(increments, step_ends, &local, &mut now, &mut sizes);
+            told_angle = told_angle.max(angle);
+        }
+        for centre in self.centres.iter() {
+            let [error, moved] = self.of_centre(centre, to, increments.is_some());
+            now.take(SlotKind::Displacement, error, moved);
         }
         let now = now.root();
         for (sum, size) in self.sums.iter_mut().zip(sizes) {
@@ -437,13 +465,23 @@ impl CarriedError {
             sum.displacement += size.displacement;
             sum.rotation += size.rotation;
         }
-        self.largest = self.largest.or(now);
+        self.largest = self.largest.or(Largest { rotation: told_angle, ..now });
         let size = (now.displacement / self.length).max(now.rotation);
         self.scaling = if size > 0.0 { SCALED_ERROR / size } else { 0.0 };
     }
 
+    /// The error of a mass centre, and how it has moved since the start of the stage.
+    fn of_centre(&self, centre: &MassCentre, to: &State, is_material: bool) -> [Vec3; 2] {
+        let MassCentre { place, rotation, offset } = *centre;
+        let [place_error, turn] = [place, rotation].map(|slot| &self.slots[slot as usize]);
+        let Rotation { r, t, .. } = Rotation::new(to.q[rotation as usize]);
+        let material = if is_material { turn.error } else { t * turn.error };
+        let moved = to.q[place as usize] - place_error.start + r * offset - Rotation::new(turn.start).r * offset;
+        [place_error.error + r * material.cross(offset), moved]
+    }
+
     /// Ends a step of the rotations whose unknowns are increments: takes the largest error and the
-    /// sizes of local errors.
+    /// sizes of local errors. Returns the largest error that is told.
     fn end_turns(
         &mut self,
         increments: &Increments,
@@ -451,7 +489,8 @@ impl CarriedError {
         local: &LocalErrors,
         largest: &mut Largest,
         sizes: &mut [Largest; 2],
-    ) {
+    ) -> f64 {
+        let mut told_angle = 0.0f64;
         let found = self.known == Known::Error;
         let h = self.step.length;
         for (slot, turned) in self.turned.drain(..).filter(|_| found) {
@@ -461,17 +500,24 @@ impl CarriedError {
         for (before, after) in increments.accelerations(from).zip(increments.accelerations(to)) {
             let slot = &mut self.slots[after.slot as usize];
             if slot.moves {
+                let q = to.q[after.slot as usize];
                 let ends = [before.driven, after.driven];
                 let rings = local.rings(slot, ends);
                 let [of_place, of_rate] = local.of(slot, ends);
                 let of_spin = (after.free - before.free) * (h.powi(4) * after.spin.squared() * FREE_SPIN_ERROR);
-                let back = Rotation::new(to.q[after.slot as usize]).r.transpose();
-                take_size(sizes, SlotKind::Rotation, of_place + of_spin, rings);
-                slot.error += back * (of_place + of_spin);
-                slot.rate += back * of_rate;
+                let back = Rotation::new(q).r.transpose();
+                // Of h^3/6 (mu' + phi') the step leaves out what moments do to phi, which is -12 lead.
+                let of_moments = after.lead * (-2.0 * h.powi(3));
+                let rate_of_moments = (after.lead - before.lead) * (-2.0 * h * h);
+                let of_step = of_place + of_spin + of_moments;
+                take_size(sizes, SlotKind::Rotation, of_step, rings);
+                slot.error += back * (of_step - (of_rate + rate_of_moments) * h);
+                slot.rate += back * (of_rate + rate_of_moments);
+                told_angle = told_angle.max(slot.no_larger_than_turned(slot.error, q));
             }
             largest.take(SlotKind::Rotation, slot.error, Vec3::ZERO);
         }
+        told_angle
     }
 
     /// Carries errors into the complement chart for the total rotation vectors of a state that are
@@ -507,10 +553,11 @@ impl CarriedError {
         } else {
             MAX_GROWTH
         };
+        let longest = self.centres.iter().map(|centre| centre.offset.norm()).fold(0.0, f64::max);
         // Slots without mass have no local errors of their own.
         let bounded = |error: f64, sum: f64| if sum > 0.0 { error.min(most * sum) } else { error };
         Largest {
-            displacement: bounded(self.largest.displacement, all.displacement),
+            displacement: bounded(self.largest.displacement, all.displacement + longest * all.rotation),
             rotation: bounded(self.largest.rotation, all.rotation),
             moved: self.largest.moved,
         }

@@ -183,7 +183,7 @@ pub struct Accelerations {
 }
 
 /// The mass properties at each rotation, summed up, with the slot of the displacement of its node.
-fn bodies_by_rotation(model: &Model) -> BTreeMap<Slot, (Slot, Inertia)> {
+pub(super) fn bodies_by_rotation(model: &Model) -> BTreeMap<Slot, (Slot, Inertia)> {
     let mut sums: BTreeMap<Slot, (Slot, Inertia)> = BTreeMap::new();
     for masses in model.effects.iter().filter_map(|effect| effect.roles().masses) {
         masses.bodies(&mut |node, body| {

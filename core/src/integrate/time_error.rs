@@ -9,8 +9,10 @@
 //! integrated beside the motion (`carried_error`).
 
 use super::carried_error::{CarriedError, FREE_SPIN_ERROR, SLOPE_STEPS};
+use super::increments::bodies_by_rotation;
 use super::{Increments, Stages, Step};
 use crate::kernel::Weights;
+use crate::kernel::inertia::Inertia;
 use crate::model::charts::DYNAMIC_BAND;
 use crate::model::{Assembly, Model, SlotKind};
 use crate::system::{DofMap, Field, Slot, State, System};
@@ -47,11 +49,11 @@ const UNKNOWN: Vec3 = Vec3([f64::NAN; 3]);
 /// The largest errors of a stage, and the largest displacement to compare them with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Largest {
-    /// Largest error of a displacement, a length
+    /// Largest error of a displacement of a node or a mass centre, a length
     pub displacement: f64,
-    /// Largest error of a rotation, in radians
+    /// Largest error of a rotation that has inertia, in radians
     pub rotation: f64,
-    /// Largest displacement of a node since the start of the stage, a length
+    /// Largest displacement of a node or a mass centre since the start of the stage, a length
     pub moved: f64,
 }
 
@@ -95,6 +97,31 @@ pub(super) struct Scene {
     pub(super) length: f64,
     /// True for each slot whose accelerations are determined by mass
     massive: Vec<bool>,
+    /// Mass centres away from their nodes
+    #[serde(skip)]
+    pub(super) centres: Arc<Vec<MassCentre>>,
+}
+
+/// The mass centre of what is fixed to a node, away from the node.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MassCentre {
+    /// The slot of the displacement of the node
+    pub(super) place: Slot,
+    /// The slot of its rotation
+    pub(super) rotation: Slot,
+    /// From the node to the centre, in global axes of the initial placement
+    pub(super) offset: Vec3,
+}
+
+impl MassCentre {
+    /// Those of a model.
+    fn of(model: &Model) -> Arc<Vec<Self>> {
+        let bodies = bodies_by_rotation(model).into_iter();
+        let centre = |(rotation, (place, body)): (Slot, (Slot, Inertia))| {
+            (body.offset != Vec3::ZERO).then_some(Self { place, rotation, offset: body.offset })
+        };
+        Arc::new(bodies.filter_map(centre).collect())
+    }
 }
 
 impl Scene {
@@ -171,8 +198,10 @@ impl TimeError {
     /// The estimator with the kinds of slots of a model, which checkpoints leave out.
     pub fn of_model(mut self, model: &Model) -> Self {
         self.scene.kinds = model.kinds.clone();
+        self.scene.centres = MassCentre::of(model);
         if let Some(carried) = &mut self.carried {
             carried.kinds = model.kinds.clone();
+            carried.centres = self.scene.centres.clone();
         }
         self
     }
@@ -188,7 +217,12 @@ impl TimeError {
         first: Step,
         duration: f64,
     ) -> Self {
-        let scene = Scene { kinds: model.kinds.clone(), length: model.length, massive: massive.to_vec() };
+        let scene = Scene {
+            kinds: model.kinds.clone(),
+            length: model.length,
+            massive: massive.to_vec(),
+            centres: MassCentre::of(model),
+        };
         let mut past = state.a.clone();
         match first.scheme.stages {
             Stages::End => (),
