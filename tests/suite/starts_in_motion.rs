@@ -3,6 +3,7 @@
 use crate::random::Random;
 use crate::scenes::{distance, list, simulate};
 use beamsim_core::tensor::Vec3;
+use beamsim_core::warning::WarningKind;
 
 /// Two bodies on joints, one to the ground and one between them, with gravity; random places, axes and inertia.
 fn mechanism(random: &mut Random, spins: bool) -> String {
@@ -141,5 +142,33 @@ fn supports_and_motions_that_begin_in_motion_move_all_that_joints_connect() {
             let exact = 0.5 / (5.0 - x * x).sqrt();
             assert!((spin - exact).abs() < 2e-3, "{scheme}, row {k}: {spin} for {exact}");
         }
+    }
+}
+
+/// A motion that takes hold of what moves, or moves what stands still, in a later stage is told, and its impulse is work.
+#[test]
+fn motions_that_begin_later_with_another_velocity_are_told() {
+    let random = &mut Random::new(77);
+    for scheme in SCHEMES {
+        let [mass, given, taken] = [0, 0, 0].map(|_| 10.0_f64.powf(random.range(-2.0, 2.0)));
+        let text = |motion: &str| {
+            format!(
+                "[point]\na = [0, 0, 0]\nz = [0, 5, 0]\n[[body]]\nat = \"a\"\nmass = {mass}\n[[body]]\nat = \"z\"\n\
+                 mass = {mass}\n[[initial]]\nvelocity = [{given}, 0, 0]\n\
+                 [[motion]]\nat = \"a\"\nux = 1\nhistory = {{ name = \"h\", stages = [2] }}\nstages = [2]\n\
+                 [history.h]\nexpr = \"{motion}\"\n[[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\nscheme = \"{scheme}\"\n\
+                 [[stage]]\nkind = \"dynamic\"\nend = 0.2\nstep = 0.01\nscheme = \"{scheme}\"\n\
+                 [output]\nnodes = [\"a\"]\ncolumns = [\"v\", \"energy\"]\n"
+            )
+        };
+        let at = |value: f64| format!("{} + {value}*t", 0.1 * given);
+        let jumps = simulate(&text(&at(taken)));
+        let told: Vec<_> = jumps.counters.findings.warnings.iter().map(|warning| warning.kind).collect();
+        assert_eq!(told, [WarningKind::VelocityJump], "{scheme}\n{}", text(&at(taken)));
+        let total = jumps.column("energy.total");
+        assert!((jumps.end("energy.total") / total[0] - 1.0).abs() < 1e-9, "{scheme}: {total:?}");
+        // What the motion goes on with is no jump.
+        let goes_on = simulate(&text(&at(given)));
+        assert!(goes_on.counters.findings.warnings.is_empty(), "{:?}", goes_on.counters.findings.warnings);
     }
 }

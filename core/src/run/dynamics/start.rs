@@ -5,7 +5,7 @@ use super::Dynamics;
 use super::massless::Massless;
 use crate::integrate::Method;
 use crate::kernel::Weights;
-use crate::model::{LARGEST_GAP, SlotKind, StageError};
+use crate::model::{LARGEST_GAP, Motion, NOTICED, SlotKind, StageError};
 use crate::run::energy::Entry;
 use crate::run::failure::Failure;
 use crate::run::spatial::SpatialLook;
@@ -18,6 +18,14 @@ use crate::warning::WarningKind;
 
 /// Relative change of a velocity that is round-off.
 const ROUND_OFF: f64 = 1e-9;
+
+/// What supports and motions change at once where a stage begins.
+struct Catch {
+    /// The changes of velocities in held directions, by slot
+    changes: Vec<Vec3>,
+    /// True if motions make all of them
+    by_motions: bool,
+}
 
 impl Dynamics<'_, '_> {
     /// Gives velocities, sets the clock, and finds the accelerations of the start.
@@ -34,7 +42,7 @@ impl Dynamics<'_, '_> {
         self.refuse_loose(&step)?;
         // Time steps do not look out of the plane again.
         SpatialLook::default().refuse_loose(self.stage, step.weights())?;
-        self.join_velocities(caught.as_deref())?;
+        self.join_velocities(caught.as_ref().map(|caught| &caught.changes[..]))?;
         if let Some(contacts) = self.stage.model.contacts() {
             contacts.begin_motion(self.stage.state);
         }
@@ -43,9 +51,11 @@ impl Dynamics<'_, '_> {
         self.solve_accelerations()?;
         let jerk = self.jerk_of_joints()?;
         self.start_scheme(jerk.as_ref());
+        let StageRun { bookkeeper, model, state, assembly, .. } = &mut *self.stage;
         if begins {
-            let StageRun { bookkeeper, model, state, assembly, .. } = &mut *self.stage;
             bookkeeper.bring_in(Entry::new(model, state, assembly));
+        } else if let Some(Catch { by_motions: true, .. }) = &caught {
+            bookkeeper.push(Entry::new(model, state, assembly));
         }
         self.stage.open_account()?;
         self.open_guard();
@@ -94,7 +104,7 @@ impl Dynamics<'_, '_> {
 
     /// Changes charts, and keeps the changes of velocities of rotations whose chart stays: in another
     /// one rates are others, and the impulse of those is left out.
-    fn change_charts_with(&mut self, caught: Option<Vec<Vec3>>) -> Option<Vec<Vec3>> {
+    fn change_charts_with(&mut self, caught: Option<Catch>) -> Option<Catch> {
         let Some(mut caught) = caught else {
             self.stage.change_charts(None);
             return None;
@@ -102,19 +112,19 @@ impl Dynamics<'_, '_> {
         let before = self.stage.state.q.clone();
         self.stage.change_charts(None);
         let is_changed = |slot: &usize| self.stage.state.q[*slot] != before[*slot];
-        (0..before.len()).filter(is_changed).for_each(|slot| caught[slot] = Vec3::ZERO);
+        (0..before.len()).filter(is_changed).for_each(|slot| caught.changes[slot] = Vec3::ZERO);
         Some(caught)
     }
 
     /// The changes of the velocities in held directions, which were `held` before: where supports and
-    /// motions act that did not act before. `None` without such. Supports are told.
-    fn caught(&mut self, held: &[Vec3]) -> Option<Vec<Vec3>> {
+    /// motions act that did not act before. `None` without such. They are told.
+    fn caught(&mut self, held: &[Vec3]) -> Option<Catch> {
         let StageRun { state, assembly, model, .. } = &*self.stage;
         let dof_map = &assembly.system.pattern.dof_map;
         let change = |slot: usize| dof_map.held_part(slot as Slot, state.v[slot]) - held[slot];
-        let caught = threads::list(held.len(), change);
+        let changes = threads::list(held.len(), change);
         let is_change = |slot: &usize| {
-            let size = caught[*slot].norm();
+            let size = changes[*slot].norm();
             size > ROUND_OFF * held[*slot].norm().max(state.v[*slot].norm()) && !model.kinds[*slot].is_multiplier()
         };
         let slots: Vec<usize> = (0..held.len()).filter(is_change).collect();
@@ -122,26 +132,57 @@ impl Dynamics<'_, '_> {
             return None;
         }
         self.stage.issued.caught = true;
-        self.warn_of_catch(&slots, &caught);
-        Some(caught)
+        self.warn_of_catch(&slots, &changes);
+        let by_motions = slots.iter().all(|&slot| self.motions_of(slot).next().is_some());
+        Some(Catch { changes, by_motions })
     }
 
-    /// Warns of supports among the `slots` whose velocities change; motions that begin with a velocity
-    /// are told when the deck is read.
-    fn warn_of_catch(&mut self, slots: &[usize], caught: &[Vec3]) {
-        let StageRun { schedule, model, .. } = &*self.stage;
-        let is_moved = |slot: usize| {
-            schedule.motions(model).any(|(motion, timeline)| timeline.acts() && motion.slot as usize == slot)
+    /// The motions that act on a slot.
+    fn motions_of(&self, slot: usize) -> impl Iterator<Item = &Motion> {
+        let acting = self.stage.schedule.motions(self.stage.model).filter(|(_, timeline)| timeline.acts());
+        acting.map(|(motion, _)| motion).filter(move |motion| motion.slot as usize == slot)
+    }
+
+    /// Warns of supports among the `slots` whose velocities change, and of motions whose jump was not known when the
+    /// deck was read.
+    fn warn_of_catch(&mut self, slots: &[usize], changes: &[Vec3]) {
+        let fastest = |of: &dyn Fn(usize) -> bool| {
+            let some = slots.iter().copied().filter(|&slot| of(slot));
+            some.max_by(|&a, &b| changes[a].norm().total_cmp(&changes[b].norm()))
         };
-        let by_support = slots.iter().copied().filter(|&slot| !is_moved(slot));
-        let fastest = by_support.max_by(|&a, &b| caught[a].norm().total_cmp(&caught[b].norm()));
-        let Some(slot) = fastest else { return };
-        let (node, stage) = (model.node_at(slot), self.stage.number + 1);
-        let message = format!(
-            "supports of stage {stage} stop what moves, the fastest at node \"{node}\": their impulse on all that is \
-             connected takes kinetic energy at once"
-        );
-        self.stage.warn(WarningKind::VelocityJump, message);
+        let by_support = fastest(&|slot| self.motions_of(slot).next().is_none());
+        let by_motion = fastest(&|slot| {
+            let size = changes[slot].norm();
+            let is_told = |motion: &Motion| {
+                self.was_foreseen(motion) || motion.amplitude.fastest().is_some_and(|fastest| size <= NOTICED * fastest)
+            };
+            self.motions_of(slot).any(|motion| !is_told(motion))
+        });
+        let stage = self.stage.number + 1;
+        if let Some(slot) = by_support {
+            let node = self.stage.model.node_at(slot);
+            let message = format!(
+                "supports of stage {stage} stop what moves, the fastest at node \"{node}\": their impulse on all that \
+                 is connected takes kinetic energy at once"
+            );
+            self.stage.warn(WarningKind::VelocityJump, message);
+        }
+        if let Some(slot) = by_motion {
+            let (node, size) = (self.stage.model.node_at(slot), changes[slot].norm());
+            let message = format!(
+                "a motion of stage {stage} changes the velocity of node \"{node}\" at once, by {size:.3e}: let its \
+                 history begin with the velocity that the node has there, or let the stage before end at rest"
+            );
+            self.stage.warn(WarningKind::VelocityJump, message);
+        }
+    }
+
+    /// True if the velocity of a motion's node at the start of the stage was known when the deck was read: the motion
+    /// acted in the stage that led there, and no stage has ended early.
+    fn was_foreseen(&self, motion: &Motion) -> bool {
+        let before = &self.stage.plan.stages[..self.stage.number];
+        let last = before.iter().rposition(|stage| stage.work.kind().advances_state());
+        last.is_some_and(|last| motion.amplitude.acts_in(last)) && before.iter().all(|stage| stage.until.is_none())
     }
 
     /// Sets the clock, and all accelerations but prescribed ones to zero; motors and surfaces must not

@@ -89,7 +89,7 @@ impl EnergyGuard {
     /// The error of the account of the run, if that is worth a warning; `scale` is the largest
     /// energy of the run so far.
     pub fn imbalance(&self, scale: f64) -> Option<Imbalance> {
-        if self.largest > self.floor { self.balance.imbalance(scale) } else { None }
+        if self.largest.max(scale) > self.floor { self.balance.imbalance(scale) } else { None }
     }
 
     /// Looks at the account of a step over which nodes have moved by `moved` at most; tells a

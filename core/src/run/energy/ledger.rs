@@ -118,6 +118,15 @@ impl Bookkeeper {
         }
     }
 
+    /// Motions have jumped in velocity where a stage begins, which is opened next: the kinetic energy that is new is
+    /// the work of their impulses.
+    pub fn push(&mut self, entry: Entry) {
+        if self.first.is_some() {
+            self.ledger.external += entry.energy().kinetic - self.ledger.kinetic;
+            self.scale = self.scale.max(self.ledger.external.abs());
+        }
+    }
+
     /// The strain energy has changed by this where what has no mass came into balance at once: that belongs to the
     /// account.
     pub fn shift(&mut self, change: f64) {
