@@ -147,7 +147,7 @@ warning_kinds! {
     HiddenPenetration: "hidden_penetration", Mesh;
     /// Friction holds by springs that have given way far.
     SoftStick: "soft_stick", Deck;
-    /// Friction takes more energy in a step than there is.
+    /// Friction takes more energy in a step than there is, or lets a part jump a long way.
     FrictionJump: "friction_jump", Path;
     /// A contact of a dynamic stage lasted few steps.
     ShortContact: "short_contact", Time;

@@ -1,7 +1,7 @@
 //! Contact with surfaces in whole scenes.
 
 use crate::random::Random;
-use crate::scenes::{attempt, list, refusal, simulate};
+use crate::scenes::{Simulation, attempt, list, refusal, simulate};
 use beamsim_core::failure::FailureKind;
 use beamsim_core::tensor::Vec3;
 use beamsim_core::warning::WarningKind;
@@ -1552,16 +1552,60 @@ fn springs_of_points_that_slide_hold_nothing() {
     assert!(soft.is_none(), "{soft:?}");
 }
 
-/// A ladder on a floor and a wall, both with friction mu: it stands where its angle exceeds atan((1 - mu^2)/(2 mu)), with
-/// any number of levels, in random units.
+/// A ladder stands with any number of levels where its angle exceeds the least one.
 #[test]
 fn friction_holds_a_ladder_with_any_number_of_levels() {
     let random = &mut Random::new(98);
     for _ in 0..25 {
-        let [length, mass] = [0, 0].map(|_| 10.0_f64.powf(random.range(-3.0, 3.0)));
         let mu = random.range(0.25, 0.9);
-        let least = ((1.0 - mu * mu) / (2.0 * mu)).atan();
-        let angle = random.range(least + 0.05, 1.5);
+        let angle = random.range(least_angle_of_ladder(mu) + 0.05, 1.5);
+        let ladder = Ladder::new(random, angle, mu);
+        let run = simulate(&ladder.deck);
+        let moved = ladder.moves(&run);
+        let normal = run.end("below.normal") / ladder.weight;
+        assert!(
+            moved.iter().all(|&moved| moved < 5e-3) && (0.99 / (1.0 + mu * mu)..1.01).contains(&normal),
+            "{moved:?} {normal}\n{}",
+            ladder.deck
+        );
+    }
+}
+
+#[test]
+fn a_ladder_that_slides_away_is_told() {
+    let random = &mut Random::new(99);
+    for _ in 0..25 {
+        let mu = random.range(0.1, 0.6);
+        let angle = random.range(0.3, least_angle_of_ladder(mu) - 0.05);
+        let ladder = Ladder::new(random, angle, mu);
+        let run = attempt(&ladder.deck);
+        let tells = [WarningKind::FrictionJump, WarningKind::CameToRest];
+        let is_told = run.counters.findings.warnings.iter().any(|warning| tells.contains(&warning.kind));
+        assert!(
+            run.result.is_err() || is_told,
+            "{:?} {:?}\n{}",
+            run.counters.findings.warnings,
+            ladder.moves(&run),
+            ladder.deck
+        );
+    }
+}
+
+/// The least angle to the floor at which friction `mu` at both ends holds a rigid ladder: atan((1 - mu^2)/(2 mu)).
+fn least_angle_of_ladder(mu: f64) -> f64 {
+    ((1.0 - mu * mu) / (2.0 * mu)).atan()
+}
+
+/// A stiff ladder between a floor and a wall, in random units and a random number of levels.
+struct Ladder {
+    deck: String,
+    length: f64,
+    weight: f64,
+}
+
+impl Ladder {
+    fn new(random: &mut Random, angle: f64, mu: f64) -> Self {
+        let [length, mass] = [0, 0].map(|_| 10.0_f64.powf(random.range(-3.0, 3.0)));
         let steps = 10.0_f64.powf(random.range(0.0, 1.5)) as u32;
         let radius = 0.005 * length;
         // Forces have the unit of mass times length.
@@ -1582,12 +1626,63 @@ fn friction_holds_a_ladder_with_any_number_of_levels() {
             below = -radius,
             beyond = x + radius,
         );
-        let run = simulate(&deck);
-        let moved = ["foot.ux", "foot.uy", "top.ux", "top.uy"].map(|column| (run.end(column) / length).abs());
-        let normal = run.end("below.normal") / (98.1 * force);
-        assert!(
-            moved.iter().all(|&moved| moved < 5e-3) && (0.99 / (1.0 + mu * mu)..1.01).contains(&normal),
-            "{moved:?} {normal}\n{deck}"
+        Self { deck, length, weight: 98.1 * force }
+    }
+
+    /// Displacements of both ends, over its length.
+    fn moves(&self, run: &Simulation) -> [f64; 4] {
+        ["foot.ux", "foot.uy", "top.ux", "top.uy"].map(|column| (run.end(column) / self.length).abs())
+    }
+}
+
+/// A ball that rolls round in a tall cylinder goes up and down as often as sqrt(2/7) times per turn, and neither higher
+/// nor lower (Neimark and Fufaev 1972, Dynamics of Nonholonomic Systems).
+#[test]
+fn a_ball_that_rolls_round_in_a_cylinder_comes_up_again() {
+    let random = &mut Random::new(103);
+    for (case, scheme) in
+        ["newmark", "generalized_alpha", "lie_generalized_alpha", "lobatto"].iter().cycle().take(8).enumerate()
+    {
+        let [length, mass] = [0, 0].map(|_| 10.0_f64.powf(random.range(-3.0, 3.0)));
+        let (spin, radius) = (8.0, 0.1 * length);
+        let way = length - radius;
+        let velocity = spin * way;
+        let stiffness = 2e4 * mass;
+        let along = random.direction();
+        let out = along.cross(random.direction()).normalized().unwrap();
+        // In balance with the force that bends the way.
+        let start = out * (way + mass * velocity * spin / stiffness);
+        let text = format!(
+            "gravity = {}\n[point]\nball = {}\n[[body]]\nat = \"ball\"\nmass = {mass:e}\ninertia = [{j:e}, {j:e}, {j:e}]\n\
+             [[surface]]\nname = \"wall\"\nkind = \"cylinder\"\nfrom = {}\nto = {}\nradius = {length:e}\nside = \"inside\"\n\
+             [[contact]]\nname = \"roll\"\nnodes = [\"ball\"]\nsurfaces = [\"wall\"]\nradius = {radius:e}\nfriction = 0.9\n\
+             stiffness = {stiffness:e}\npenetration = {penetration:e}\n\
+             [[initial]]\nat = \"ball\"\nvelocity = {}\nspin = {}\nabout = \"ball\"\n\
+             [[stage]]\nkind = \"dynamic\"\nscheme = \"{scheme}\"\nstep = 2e-3\nend = 6\n\
+             [output]\nnodes = [\"ball\"]\ncolumns = [\"u\"]\n",
+            list(along * (-9.81 * length)),
+            list(start),
+            list(along * (-40.0 * length)),
+            list(along * (40.0 * length)),
+            list(along.cross(out) * velocity),
+            list(along * (-velocity / radius)),
+            j = 0.4 * mass * radius * radius,
+            penetration = 0.01 * length,
         );
+        let run = simulate(&text);
+        let parts = ["ball.ux", "ball.uy", "ball.uz"].map(|name| run.column(name));
+        let heights = (0..parts[0].len()).map(|row| Vec3([0, 1, 2].map(|k| parts[k][row])).dot(along) / length);
+        let heights: Vec<f64> = heights.collect();
+        let deepest = 2.0 * 9.81 * (5.0 / 7.0) / (spin * spin * 2.0 / 7.0);
+        let [lowest, highest] = [f64::min, f64::max].map(|most| heights.iter().copied().fold(0.0, most));
+        assert!(
+            (lowest / -deepest - 1.0).abs() < 0.015 && highest < 0.005 * deepest,
+            "{case}: {lowest} {highest}\n{text}"
+        );
+        // Of the third period from its start.
+        let period = std::f64::consts::TAU / (spin * (2.0_f64 / 7.0).sqrt());
+        let third = heights[(2.0 * period / 2e-3) as usize..].iter().take((period / 2e-3) as usize);
+        let again = third.copied().fold(f64::NEG_INFINITY, f64::max);
+        assert!(again.abs() < 0.005 * deepest, "{case} {scheme}: comes up to {again}\n{text}");
     }
 }

@@ -4,6 +4,7 @@ use crate::random::Random;
 use crate::scenes::{attempt, list, simulate};
 use beamsim_core::run::{EventKind, Failure};
 use std::f64::consts::TAU;
+use std::fs;
 
 /// Lee's frame (two-node mesh of twenty elements a leg) under P = 2, beyond its first limit.
 fn lee(stage: &str) -> String {
@@ -406,5 +407,17 @@ fn arc_length_does_not_pass_over_a_structure_that_snaps_through() {
                 && (limits[1] + 1.0).abs() < 1e-6,
             "{bars} bars of height {height}, {beyond} times the limit in {steps} increments: {limits:?}"
         );
+    }
+}
+
+/// Free strains that act in full from the start lead away from a state that is none of the path: no branch lies between.
+#[test]
+fn what_acts_at_once_passes_no_branch() {
+    let deck = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/decks/prestress/bimetal.toml")).unwrap();
+    let at_once = deck.replace("free_strain =", "history = \"now\"\nfree_strain =") + "\n[history.now]\nexpr = \"1\"\n";
+    let [slowly, at_once] = [deck, at_once].map(|deck| simulate(&deck));
+    assert!((at_once.end("tip.ux") / slowly.end("tip.ux") - 1.0).abs() < 1e-9);
+    for run in [slowly, at_once] {
+        assert!(run.counters.findings.warnings.is_empty(), "{:?}", run.counters.findings.warnings);
     }
 }

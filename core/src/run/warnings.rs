@@ -4,7 +4,7 @@ use super::energy::is_unbalanced;
 use super::failure::Moment;
 use super::findings::Warning;
 use super::stage_run::StageRun;
-use crate::effect::{ElasticStick, Penetration};
+use crate::effect::{ElasticStick, Penetration, RoundOff};
 use crate::interrupt;
 use crate::kernel::Weights;
 use crate::model::charts;
@@ -80,15 +80,22 @@ impl StageRun<'_> {
     /// A modal or buckling stage about a state that is not in balance.
     pub fn warn_out_of_balance(&mut self) {
         self.assembly.forget();
-        let round_off = self.assembly.round_off(self.state);
         self.assembly.evaluate(self.state, Weights::NONE, None);
-        let loose = Convergence { tolerance: LOOSE_BALANCE, negligible: 0.0 };
-        let verdict = loose.judge(self.model, &self.assembly.system, round_off, None).verdict;
-        if !matches!(verdict, Verdict::Converged | Verdict::Noisy) && self.is_away_from_equilibrium() {
+        if !self.is_nearly_balanced() && self.is_away_from_equilibrium() {
             let message = "the modal or buckling stage does not start from an equilibrium: put a static stage before \
                            it";
             self.warn(WarningKind::OutOfBalance, message);
         }
+    }
+
+    /// True if the forces that were evaluated last are in balance, or nearly so.
+    pub fn is_nearly_balanced(&self) -> bool {
+        let loose = Convergence { tolerance: LOOSE_BALANCE, negligible: 0.0 };
+        let is_balanced_within = |round_off| {
+            let verdict = loose.judge(self.model, &self.assembly.system, round_off, None).verdict;
+            matches!(verdict, Verdict::Converged | Verdict::Noisy)
+        };
+        is_balanced_within(RoundOff::default()) || is_balanced_within(self.assembly.round_off(self.state))
     }
 
     /// True if Newton's first correction moves the state noticeably. Where no force but round-off acts

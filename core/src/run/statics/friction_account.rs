@@ -10,6 +10,38 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// rule is coarse where a step is.
 const LARGEST_MISSING_SHARE: f64 = 0.5;
 
+/// The energy that a step may leave over, by the forces at its end, over all that it moves. What a spring takes along leaves
+/// a third.
+const LARGEST_SURPLUS: f64 = 0.4;
+
+/// The energies of a step.
+struct Exchange {
+    /// By loads and motions: by the forces at the end of the step, if that is more, since a load may pass from one
+    /// support to another at the very start
+    given: f64,
+    /// By friction
+    taken: f64,
+    /// As strain
+    stored: f64,
+    /// The work of normal forces that is not booked while gaps change within what is allowed
+    unbooked: f64,
+}
+
+impl Exchange {
+    /// A part of all that is moved.
+    fn part(&self, part: f64) -> f64 {
+        part * (self.stored.abs() + self.taken + self.given.abs()) + self.unbooked
+    }
+
+    fn is_overdrawn(&self) -> bool {
+        self.stored + self.taken - self.given > self.part(LARGEST_MISSING_SHARE)
+    }
+
+    fn has_surplus(&self) -> bool {
+        self.given - self.stored - self.taken > self.part(LARGEST_SURPLUS)
+    }
+}
+
 /// The account of a static stage.
 pub(super) struct FrictionAccount {
     /// `None` where nothing rubs, or forces act whose work is not booked
@@ -40,10 +72,22 @@ impl FrictionAccount {
     /// True if friction and strain take far more energy on the way to a balanced state than loads and
     /// motions give: no path of equilibrium leads there.
     pub fn is_overdrawn(&self, stage: &StageRun) -> bool {
-        let (Some(bookkeeper), Some(contacts)) = (&self.bookkeeper, stage.model.contacts()) else { return false };
+        self.exchange(stage, NEGLIGIBLE).is_some_and(|exchange| exchange.is_overdrawn())
+    }
+
+    /// True if loads and motions give far more energy on the way to a balanced state than friction and strain take:
+    /// what is left would set parts in motion. Without an account nothing tells against it.
+    pub fn has_surplus(&self, stage: &StageRun) -> bool {
+        self.exchange(stage, 0.0).is_none_or(|exchange| exchange.has_surplus())
+    }
+
+    /// The energies on the way to a balanced state; `None` without an account, or where friction takes no more than a
+    /// part of the largest energy.
+    fn exchange(&self, stage: &StageRun, negligible: f64) -> Option<Exchange> {
+        let (bookkeeper, contacts) = (self.bookkeeper.as_ref()?, stage.model.contacts()?);
         let taken = -contacts.friction_work(stage.state);
-        if taken <= NEGLIGIBLE * bookkeeper.scale() {
-            return false;
+        if taken <= negligible * bookkeeper.scale() {
+            return None;
         }
         // Surfaces that are driven do work by the forces in memory.
         let mut ahead = stage.state.clone();
@@ -51,11 +95,9 @@ impl FrictionAccount {
         let entry = Entry::new(stage.model, &ahead, &stage.assembly);
         let [before, after] = [bookkeeper.ledger(), bookkeeper.ledger_at(entry)];
         let stored = after.strain - before.strain;
-        // A load may pass from one support to another at the very start of a step.
         let given = (after.external - before.external).max(bookkeeper.work_by_end_forces(entry));
-        // Normal forces do work that is not booked while gaps change within what is allowed.
         let unbooked = contacts.survey(stage.state).work_in_penetration;
-        stored + taken - given > LARGEST_MISSING_SHARE * (stored.abs() + taken + given.abs()) + unbooked
+        Some(Exchange { given, taken, stored, unbooked })
     }
 
     /// True once, for the first warning of the stage.

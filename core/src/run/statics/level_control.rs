@@ -35,6 +35,8 @@ enum StepOutcome {
     Strayed(Option<Signature>),
     /// Balance, with more friction than energy: perhaps on another branch
     Overdrawn(Option<Signature>),
+    /// Balance, with parts that have slid much further than before: perhaps nothing holds them
+    SlidAway(Option<Signature>),
     /// No balance
     Failed(NewtonFailure),
 }
@@ -84,8 +86,12 @@ impl LoadLevels<'_, '_> {
         let mut space = SpatialLook::default();
         let loose = begin(self.stage, &mut space)?;
         let levels = Levels::new(self.stage.state.kept(), self.steps, self.approach);
-        let stability = Stability::new(self.stage);
+        let mut stability = Stability::new(self.stage);
         let at_start = stability.signature;
+        if !self.stage.is_nearly_balanced() {
+            // What acts all at once leads away from a state that is none of the path.
+            stability.signature = None;
+        }
         self.stage.good.copy_from(self.stage.state);
         let friction_account = FrictionAccount::open(self.stage);
         LevelControl { stage: self.stage, space, levels, stability, friction_account, at_start, loose, touch: None }
@@ -194,12 +200,17 @@ impl LevelControl<'_, '_> {
                     self.go_back();
                 }
                 StepOutcome::Good(signature) => self.take_step(signature)?,
+                StepOutcome::SlidAway(signature) if self.levels.is_close(next - self.stage.good.load) => {
+                    self.warn_of_slide();
+                    self.take_step(signature)?;
+                }
                 StepOutcome::Failed(NewtonFailure::Interrupted(signal)) => return Err(self.stage.stop(signal)),
                 _ if self.halve(next) => self.go_back(),
                 StepOutcome::Overdrawn(signature) => {
                     self.warn_of_friction();
                     self.take_step(signature)?;
                 }
+                StepOutcome::SlidAway(signature) => self.take_step(signature)?,
                 // Nothing tells better.
                 StepOutcome::Strayed(signature) => self.take_step(signature)?,
                 StepOutcome::Jumped(signature) if self.levels.approach != Approach::Path => {
@@ -296,6 +307,19 @@ impl LevelControl<'_, '_> {
         self.stage.warn(WarningKind::FrictionJump, message);
     }
 
+    /// Parts slide far however short the step.
+    fn warn_of_slide(&mut self) {
+        if !self.friction_account.may_warn() {
+            return;
+        }
+        let at = self.stage.moment();
+        let message = format!(
+            "just before {at} friction no longer holds a part, which jumps to another equilibrium: forces and friction \
+             there depend on the way (if it matters, simulate the motion in a dynamic stage)"
+        );
+        self.stage.warn(WarningKind::FrictionJump, message);
+    }
+
     fn try_step(&mut self, next: f64) -> StepOutcome {
         if let Err(failure) = self.stage.attempt_within(next, self.refused_contraction()) {
             return StepOutcome::Failed(failure);
@@ -309,6 +333,13 @@ impl LevelControl<'_, '_> {
         }
         let StageRun { model, good, state, newton, soft, contact_change, .. } = &*self.stage;
         let changes = self.stability.changes_to(signature);
+        if self.stage.rubs()
+            && *contact_change != ContactChange::None
+            && self.levels.may_have_slid_away(model, [good, state])
+            && self.friction_account.has_surplus(self.stage)
+        {
+            return StepOutcome::SlidAway(signature);
+        }
         match contact_change {
             ContactChange::Slides => return StepOutcome::Good(signature),
             // A contact that comes or goes is a kink of the path, unless it goes to another branch.

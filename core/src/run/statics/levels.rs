@@ -26,6 +26,9 @@ const CLOSE: f64 = 1.0 / 256.0;
 /// which it has jumped.
 const JUMP: f64 = 8.0;
 
+/// The motion, over the length of the scene or in radians, up to which sliding is no jump, however sudden.
+const FAR_SLIDE: f64 = 0.05;
+
 /// A step that goes against the tangent it set out along, by a cosine below this, may have gone to
 /// another branch.
 const BACK: f64 = -0.5;
@@ -121,14 +124,29 @@ impl Levels {
         if self.approach == Approach::Straight {
             return false;
         }
-        let (step, risen) = (to.load - from.load, from.load - self.start.load);
         if changes == 0 {
             // A stage may begin out of balance: its first step need not go along a path.
-            return risen > 0.0 && has_turned_back(model, from, to, first);
+            return from.load > self.start.load && has_turned_back(model, from, to, first);
         }
-        let moved = distance(model, from, to);
-        let usual = if risen > 0.0 { distance(model, &self.start, from) / risen * step } else { f64::INFINITY };
-        step > CLOSE * self.level || moved > (JUMP * usual).max(NO_MOTION)
+        let usual = self.usual_motion(model, states).unwrap_or(f64::INFINITY);
+        !self.is_close(to.load - from.load) || distance(model, from, to) > (JUMP * usual).max(NO_MOTION)
+    }
+
+    /// True if parts that slide have moved much further in a step than on the way to it.
+    pub fn may_have_slid_away(&self, model: &Model, states: [&State; 2]) -> bool {
+        let usual = self.usual_motion(model, states).unwrap_or(0.0);
+        self.approach != Approach::Straight && distance(model, states[0], states[1]) > (JUMP * usual).max(FAR_SLIDE)
+    }
+
+    /// True if a step is so short that what moves far in it has jumped.
+    pub fn is_close(&self, step: f64) -> bool {
+        step <= CLOSE * self.level
+    }
+
+    /// The motion in a step that moves as the stage has done before it; `None` in its first step.
+    fn usual_motion(&self, model: &Model, [from, to]: [&State; 2]) -> Option<f64> {
+        let risen = from.load - self.start.load;
+        (risen > 0.0).then(|| distance(model, &self.start, from) / risen * (to.load - from.load))
     }
 }
 
