@@ -114,6 +114,31 @@ fn forces_of_joints_that_begin_in_motion_are_of_second_order() {
     }
 }
 
+/// In the first steps as well, where a scheme with a lag between true and algorithmic accelerations would let them swing.
+#[test]
+fn forces_of_joints_do_not_swing_in_the_first_steps() {
+    let mut random = Random::new(12);
+    for scheme in ["hht", "generalized_alpha\"\nrho_inf = 0.5 # \""] {
+        let mut sums = [0.0; 2];
+        for _ in 0..8 {
+            let deck = mechanism(&mut random, true);
+            let exact = exact(&deck);
+            for (sum, step) in sums.iter_mut().zip([0.01, 0.005]) {
+                let run = simulate(&format!("{deck}{}", stages(scheme, step, &[0.1])));
+                let stride = (step / 0.0025).round() as usize;
+                let off = |(name, exact): (&str, &Vec<f64>)| {
+                    let forces = run.column(name);
+                    let size = exact.iter().fold(0.0_f64, |size, force| size.max(force.abs()));
+                    (1..6).map(|k| (forces[k] - exact[stride * k]).abs()).fold(0.0, f64::max) / size
+                };
+                *sum += ["A.fx", "A.fy", "A.fz"].into_iter().zip(&exact).map(off).fold(0.0, f64::max);
+            }
+        }
+        let [coarse, fine] = sums;
+        assert!(fine < 0.35 * coarse, "{scheme}: {coarse} and {fine}");
+    }
+}
+
 /// A body on a hinge about z, at (2, 1, 0) from it, that turns at 1 rad/s in a stage before `more` acts on it.
 fn hinged(scheme: &str, spin: f64, more: &str) -> String {
     format!(
@@ -171,4 +196,39 @@ fn motions_that_begin_later_with_another_velocity_are_told() {
         let goes_on = simulate(&text(&at(given)));
         assert!(goes_on.counters.findings.warnings.is_empty(), "{:?}", goes_on.counters.findings.warnings);
     }
+}
+
+/// A motion and a support at one node: the support is told, and what it takes is no work of the motion. What acts before
+/// as well is told once, when the deck is read; a motion by a formula that begins at rest jumps nowhere.
+#[test]
+fn motions_and_supports_that_begin_together_are_told_apart() {
+    let text = |initial: &str, stages: &str, formula: &str, more: &str| {
+        format!(
+            "[point]\na = [0, 0, 0]\nz = [0, 5, 0]\n[[body]]\nat = \"a\"\nmass = 2\n[[body]]\nat = \"z\"\nmass = 3\n\
+             [[initial]]\nat = \"a\"\nvelocity = {initial}\n[[initial]]\nat = \"z\"\nvelocity = [0, 1, 0]\n\
+             [[motion]]\nat = \"a\"\nux = 1\nhistory = \"h\"\nstages = {stages}\n[history.h]\nexpr = \"{formula}\"\n{more}\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\n[[stage]]\nkind = \"dynamic\"\nend = 0.2\nstep = 0.01\n\
+             [output]\nnodes = [\"a\"]\ncolumns = [\"v\", \"energy\"]\n"
+        )
+    };
+    let told = |text: &str| {
+        let run = simulate(text);
+        let jumps = run.counters.findings.warnings.iter().filter(|warning| warning.kind == WarningKind::VelocityJump);
+        let messages: Vec<_> = jumps.map(|warning| warning.message.clone()).collect();
+        (messages, run)
+    };
+    // It goes on with 0.5 along x and is caught along y.
+    let support = "[[support]]\nat = \"a\"\nfix = [\"uy\"]\nstages = [2]\n";
+    let (messages, run) = told(&text("[0.5, 2, 0]", "[2]", "0.5*t", support));
+    assert!(messages.len() == 1 && messages[0].contains("supports of stage 2"), "{messages:?}");
+    assert!(run.end("energy.external").abs() < 1e-12, "{}", run.end("energy.external"));
+    // Both jump.
+    let (messages, _) = told(&text("[0.5, 2, 0]", "[2]", "0.05 + 3*(t - 0.1)", support));
+    assert_eq!(messages.len(), 2, "{messages:?}");
+    // The motion acts in both stages without a jump.
+    let (messages, _) = told(&text("[0.5, 0, 0]", "[1, 2]", "0.5*t", ""));
+    assert!(messages.is_empty(), "{messages:?}");
+    // A node at rest is moved smoothly.
+    let (messages, _) = told(&text("[0, 0, 0]", "[2]", "(t - 0.1)^2", ""));
+    assert!(messages.is_empty(), "{messages:?}");
 }

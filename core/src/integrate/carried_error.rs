@@ -181,15 +181,15 @@ impl SlotError {
         }
     }
 
-    /// The size of the error of a rotation that is now `q`, but no more than twice what it has turned: a linear equation does not
-    /// know that what turns to and fro errs by no more.
+    /// The size of the error of a rotation that is now `q`, but no more than twice the angle from its start: a linear
+    /// equation does not know that what turns to and fro errs by no more. The largest over all steps is told.
     #[inline(always)]
-    fn no_larger_than_turned(&self, error: Vec3, q: Vec3) -> f64 {
+    fn bounded_by_angle(&self, error: Vec3, q: Vec3) -> f64 {
         let size = error.norm();
         if size <= SMALL_ANGLE {
             return size;
         }
-        size.min(2.0 * relative_angle(Rotation::new(self.start).r, Rotation::new(q).r))
+        size.min(SMALL_ANGLE.max(2.0 * relative_angle(Rotation::new(self.start).r, Rotation::new(q).r)))
     }
 
     /// A step of a rotation that starts with `part` times the error, and the increment with which
@@ -435,9 +435,12 @@ impl CarriedError {
                     slot.rate += of_rate;
                 }
                 let moved = if kind == SlotKind::Displacement { to.q[k] - slot.start } else { Vec3::ZERO };
-                largest.take(kind, now, moved);
+                // Rotations without inertia follow what has inertia.
+                if kind != SlotKind::Rotation || slot.moves {
+                    largest.take(kind, now, moved);
+                }
                 if kind == SlotKind::Rotation && slot.moves {
-                    told_angle = told_angle.max(slot.no_larger_than_turned(now, to.q[k]));
+                    told_angle = told_angle.max(slot.bounded_by_angle(now, to.q[k]));
                 }
             }
             (largest, told_angle, sizes)
@@ -477,7 +480,10 @@ impl CarriedError {
         let Rotation { r, t, .. } = Rotation::new(to.q[rotation as usize]);
         let material = if is_material { turn.error } else { t * turn.error };
         let moved = to.q[place as usize] - place_error.start + r * offset - Rotation::new(turn.start).r * offset;
-        [place_error.error + r * material.cross(offset), moved]
+        // What turns about a node errs by no more than across.
+        let about_node = material.cross(offset);
+        let most = (2.0 * offset.norm() / about_node.norm()).min(1.0);
+        [place_error.error + r * about_node * most, moved]
     }
 
     /// Ends a step of the rotations whose unknowns are increments: takes the largest error and the
@@ -511,11 +517,12 @@ impl CarriedError {
                 let rate_of_moments = (after.lead - before.lead) * (-2.0 * h * h);
                 let of_step = of_place + of_spin + of_moments;
                 take_size(sizes, SlotKind::Rotation, of_step, rings);
-                slot.error += back * (of_step - (of_rate + rate_of_moments) * h);
+                let now = slot.error + back * of_step;
+                slot.error = now - back * ((of_rate + rate_of_moments) * h);
                 slot.rate += back * (of_rate + rate_of_moments);
-                told_angle = told_angle.max(slot.no_larger_than_turned(slot.error, q));
+                told_angle = told_angle.max(slot.bounded_by_angle(now, q));
+                largest.take(SlotKind::Rotation, now, Vec3::ZERO);
             }
-            largest.take(SlotKind::Rotation, slot.error, Vec3::ZERO);
         }
         told_angle
     }
@@ -553,7 +560,7 @@ impl CarriedError {
         } else {
             MAX_GROWTH
         };
-        let longest = self.centres.iter().map(|centre| centre.offset.norm()).fold(0.0, f64::max);
+        let longest = MassCentre::longest(&self.centres);
         // Slots without mass have no local errors of their own.
         let bounded = |error: f64, sum: f64| if sum > 0.0 { error.min(most * sum) } else { error };
         Largest {

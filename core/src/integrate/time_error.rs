@@ -122,9 +122,19 @@ impl MassCentre {
         };
         Arc::new(bodies.filter_map(centre).collect())
     }
+
+    /// The longest way from a node to one of them.
+    pub fn longest(centres: &[Self]) -> f64 {
+        centres.iter().map(|centre| centre.offset.norm()).fold(0.0, f64::max)
+    }
 }
 
 impl Scene {
+    /// The longest way from a node to a mass centre.
+    pub fn longest_offset(&self) -> f64 {
+        MassCentre::longest(&self.centres)
+    }
+
     /// True if the accelerations of a slot are determined by mass and it is no multiplier.
     pub fn moves(&self, slot: usize) -> bool {
         self.massive[slot] && !self.kinds[slot].is_multiplier()
@@ -367,7 +377,8 @@ impl TimeError {
             let [driven, free] = std::mem::replace(past, [turn.driven, turn.free]);
             let of_spin = (turn.free - free) * (h2 * h2 * turn.spin.squared() * FREE_SPIN_ERROR);
             if self.scene.moves(turn.slot as usize) {
-                now.take(SlotKind::Rotation, (turn.driven - driven) * factor + of_spin, Vec3::ZERO);
+                let of_moments = turn.lead * (2.0 * h2 * step.length * SLOPE_STEPS as f64);
+                now.take(SlotKind::Rotation, (turn.driven - driven) * factor + of_spin - of_moments, Vec3::ZERO);
             }
         }
         let now = now.root();
@@ -382,6 +393,7 @@ impl TimeError {
         let Largest { displacement, rotation, moved } = self.sum;
         let done = self.steps as f64 / self.of_steps;
         let ahead = 1.0 / done.min(1.0);
+        let displacement = displacement + self.scene.longest_offset() * rotation;
         let is_large = displacement * ahead > MIN_RELATIVE_ERROR * moved || rotation * ahead > MIN_ROTATION_ERROR;
         is_large && self.steps >= MIN_STEPS && done >= MIN_STAGE_SHARE && self.scene.kinds.len() <= MAX_SLOTS_CARRIED
     }

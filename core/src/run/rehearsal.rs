@@ -16,10 +16,10 @@ const SAME_VALUE: f64 = 1e-9;
 
 /// Velocities that agree to this part of the larger one are the same: those of initial motions come
 /// from other numbers.
-const SAME_VELOCITY: f64 = 1e-6;
+pub(super) const SAME_VELOCITY: f64 = 1e-6;
 
 /// The way of a whole stage with a velocity that is round-off, in lengths of the scene or radians.
-const INVISIBLE_WAY: f64 = 1e-12;
+pub(super) const INVISIBLE_WAY: f64 = 1e-12;
 
 /// Axes with this cosine are the same.
 const SAME_AXIS: f64 = 1.0 - 1e-9;
@@ -436,7 +436,7 @@ fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
 }
 
 /// The smallest jump of a velocity that is told.
-fn noticed_jump(fastest: Option<f64>, slowest: f64) -> f64 {
+pub(super) fn noticed_jump(fastest: Option<f64>, slowest: f64) -> f64 {
     fastest.map_or(slowest, |fastest| slowest.max(NOTICED * fastest))
 }
 

@@ -70,9 +70,10 @@ impl CarriedTraction {
         Turn::new(self.normal, n).of(self.force).value
     }
 
-    /// The normal about which a contact has rolled to the normal n since then: the mean of both. Where it was open, n.
+    /// The normal about which a contact has rolled to the normal n since then: the mean of both; n where it was
+    /// open, or where they are more than a right angle apart.
     pub fn rolling_normal<T: Real>(&self, n: Vec3<T>) -> RollingNormal<T> {
-        if self.normal == Vec3::ZERO {
+        if Vec3::constant(self.normal).dot(n).largest() <= 0.0 {
             return RollingNormal { value: n, over_normal: T::one() };
         }
         let half = T::constant(0.5);

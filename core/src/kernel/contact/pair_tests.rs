@@ -237,7 +237,9 @@ fn set_friction<const NA: usize, const NB: usize>(random: &mut Random, scene: &m
     let normal = scene.now(Weights::NONE).1.normal;
     let n0 = (normal + random.vector(0.2)).normalized().unwrap();
     let free = random.vector(0.3);
-    scene.law.carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
+    let carried = CarriedTraction { force: free - n0 * n0.dot(free), normal: n0, ..CarriedTraction::default() };
+    // Some were open.
+    scene.law.carried = if random.between(0.0, 1.0) < 0.25 { CarriedTraction::default() } else { carried };
     scene.law.friction = Some(FrictionLaw::plain(random.between(0.1, 1.5), random.between(0.5, 3.0)));
 }
 

@@ -62,8 +62,8 @@ const STANDS_STILL: f64 = 1e-2;
 
 /// The path is followed as far as this, in lengths of the scene.
 const FARTHEST: f64 = 100.0;
-/// Where nothing was found so far, the difference from 1 of the drift of an extrapolated load that keeps its distance from
-/// the load from which it is seen: what heat makes longer without stress gives way only because it becomes long.
+/// An estimate that moves on as fast as the load from which it is seen, its drift being 1 within this, is no critical load:
+/// a bar that heat lengthens without stress gives way only because it becomes long.
 const KEEPS_DISTANCE: f64 = 1e-3;
 
 /// The message about a scene without critical loads.
@@ -107,15 +107,15 @@ impl Found {
 enum Followed {
     /// To a critical load
     To(Found),
-    /// Far past where one was seen, to this load
+    /// As far as it may be, to this load, without one
     Far(f64),
 }
 
 /// A critical load as the tangent at smaller loads foresees it.
 struct Extrapolation {
     load: f64,
-    /// How fast it moves with the load from which it is seen
-    drift: f64,
+    /// How fast it moves with the load from which it is seen; `None` from a single look
+    drift: Option<f64>,
 }
 
 /// A critical load that is searched.
@@ -295,7 +295,7 @@ impl Buckling<'_, '_> {
     /// loads do not foresee it either.
     fn foresee(&mut self, aim: &Aim, followed_to: f64, start: &State) -> Result<Option<Found>, Failure> {
         let seen = self.extrapolate(aim.sight.critical, aim.before)?;
-        let seen = seen.filter(|seen| (seen.drift - 1.0).abs() > KEEPS_DISTANCE);
+        let seen = seen.filter(|seen| seen.drift.is_some_and(|drift| (drift - 1.0).abs() > KEEPS_DISTANCE));
         self.stage.go_back_to(start)?;
         if seen.is_some() {
             self.warn_of_estimate(followed_to, None);
@@ -435,8 +435,10 @@ impl Buckling<'_, '_> {
             let load = self.stage.state.load;
             let Some(critical) = next_critical_load(self.stage, way, before)? else { break };
             let now = Sight { from: load, critical };
-            let drift = last.as_ref().map_or(f64::MAX, |last| now.drift_since(last));
-            if steadiest.as_ref().is_none_or(|steadiest| drift < steadiest.drift) {
+            let drift = last.as_ref().map(|last| now.drift_since(last));
+            let is_steadier =
+                |than: &Extrapolation| drift.is_some_and(|drift| than.drift.is_none_or(|than| drift < than));
+            if steadiest.as_ref().is_none_or(is_steadier) {
                 let load = last.map_or(critical, |last| 0.5 * (critical + last.critical));
                 steadiest = Some(Extrapolation { load, drift });
             }

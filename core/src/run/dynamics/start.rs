@@ -5,9 +5,10 @@ use super::Dynamics;
 use super::massless::Massless;
 use crate::integrate::Method;
 use crate::kernel::Weights;
-use crate::model::{LARGEST_GAP, Motion, NOTICED, SlotKind, StageError};
+use crate::model::{LARGEST_GAP, Motion, MotionKind, SlotKind, StageError};
 use crate::run::energy::Entry;
 use crate::run::failure::Failure;
+use crate::run::rehearsal::{INVISIBLE_WAY, SAME_VELOCITY, noticed_jump};
 use crate::run::spatial::SpatialLook;
 use crate::run::stage_run::StageRun;
 use crate::solve::{NewtonFailure, SoftMode, Tangent, mechanism};
@@ -15,16 +16,32 @@ use crate::system::{Slot, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
+use std::collections::HashMap;
 
 /// Relative change of a velocity that is round-off.
 const ROUND_OFF: f64 = 1e-9;
 
 /// What supports and motions change at once where a stage begins.
-struct Catch {
+struct VelocityJumps {
     /// The changes of velocities in held directions, by slot
     changes: Vec<Vec3>,
     /// True if motions make all of them
-    by_motions: bool,
+    only_motions: bool,
+}
+
+/// The slot with the largest change of velocity.
+#[derive(Default)]
+struct Fastest {
+    slot: Option<usize>,
+    size: f64,
+}
+
+impl Fastest {
+    fn take(&mut self, slot: usize, size: f64) {
+        if size > self.size {
+            *self = Self { slot: Some(slot), size };
+        }
+    }
 }
 
 impl Dynamics<'_, '_> {
@@ -54,8 +71,8 @@ impl Dynamics<'_, '_> {
         let StageRun { bookkeeper, model, state, assembly, .. } = &mut *self.stage;
         if begins {
             bookkeeper.bring_in(Entry::new(model, state, assembly));
-        } else if let Some(Catch { by_motions: true, .. }) = &caught {
-            bookkeeper.push(Entry::new(model, state, assembly));
+        } else if let Some(VelocityJumps { only_motions: true, .. }) = &caught {
+            bookkeeper.book_velocity_jump(Entry::new(model, state, assembly));
         }
         self.stage.open_account()?;
         self.open_guard();
@@ -104,7 +121,7 @@ impl Dynamics<'_, '_> {
 
     /// Changes charts, and keeps the changes of velocities of rotations whose chart stays: in another
     /// one rates are others, and the impulse of those is left out.
-    fn change_charts_with(&mut self, caught: Option<Catch>) -> Option<Catch> {
+    fn change_charts_with(&mut self, caught: Option<VelocityJumps>) -> Option<VelocityJumps> {
         let Some(mut caught) = caught else {
             self.stage.change_charts(None);
             return None;
@@ -118,7 +135,7 @@ impl Dynamics<'_, '_> {
 
     /// The changes of the velocities in held directions, which were `held` before: where supports and
     /// motions act that did not act before. `None` without such. They are told.
-    fn caught(&mut self, held: &[Vec3]) -> Option<Catch> {
+    fn caught(&mut self, held: &[Vec3]) -> Option<VelocityJumps> {
         let StageRun { state, assembly, model, .. } = &*self.stage;
         let dof_map = &assembly.system.pattern.dof_map;
         let change = |slot: usize| dof_map.held_part(slot as Slot, state.v[slot]) - held[slot];
@@ -132,34 +149,38 @@ impl Dynamics<'_, '_> {
             return None;
         }
         self.stage.issued.caught = true;
-        self.warn_of_catch(&slots, &changes);
-        let by_motions = slots.iter().all(|&slot| self.motions_of(slot).next().is_some());
-        Some(Catch { changes, by_motions })
+        let only_motions = self.warn_of_jumps(&slots, &changes);
+        Some(VelocityJumps { changes, only_motions })
     }
 
-    /// The motions that act on a slot.
-    fn motions_of(&self, slot: usize) -> impl Iterator<Item = &Motion> {
-        let acting = self.stage.schedule.motions(self.stage.model).filter(|(_, timeline)| timeline.acts());
-        acting.map(|(motion, _)| motion).filter(move |motion| motion.slot as usize == slot)
-    }
-
-    /// Warns of supports among the `slots` whose velocities change, and of motions whose jump was not known when the
-    /// deck was read.
-    fn warn_of_catch(&mut self, slots: &[usize], changes: &[Vec3]) {
-        let fastest = |of: &dyn Fn(usize) -> bool| {
-            let some = slots.iter().copied().filter(|&slot| of(slot));
-            some.max_by(|&a, &b| changes[a].norm().total_cmp(&changes[b].norm()))
-        };
-        let by_support = fastest(&|slot| self.motions_of(slot).next().is_none());
-        let by_motion = fastest(&|slot| {
-            let size = changes[slot].norm();
-            let is_told = |motion: &Motion| {
-                self.was_foreseen(motion) || motion.amplitude.fastest().is_some_and(|fastest| size <= NOTICED * fastest)
-            };
-            self.motions_of(slot).any(|motion| !is_told(motion))
-        });
+    /// Warns of supports and motions that change velocities at once in the `slots`. Those of motions that were known when
+    /// the deck was read are told already. True if motions make all changes.
+    fn warn_of_jumps(&mut self, slots: &[usize], changes: &[Vec3]) -> bool {
+        let StageRun { schedule, model, state, .. } = &*self.stage;
+        let acting = schedule.motions(model).filter(|(_, timeline)| timeline.acts());
+        let mut motions: HashMap<Slot, Vec<&Motion>> = HashMap::new();
+        acting.for_each(|(motion, _)| motions.entry(motion.slot).or_default().push(motion));
+        let slowest = INVISIBLE_WAY / (self.settings.end - state.time);
+        let (mut by_support, mut by_motion) = (Fastest::default(), Fastest::default());
+        for &slot in slots {
+            let mut rest = changes[slot];
+            for motion in motions.get(&(slot as Slot)).into_iter().flatten() {
+                let (part, length) = match motion.kind {
+                    MotionKind::Translation => (motion.axis * motion.axis.dot(rest), model.length),
+                    MotionKind::Rotation => (rest, 1.0),
+                };
+                rest -= part;
+                let noticed = noticed_jump(motion.amplitude.fastest(), slowest * length);
+                if part.norm() > noticed.max(SAME_VELOCITY * state.v[slot].norm()) && !self.was_foreseen(motion) {
+                    by_motion.take(slot, part.norm());
+                }
+            }
+            if rest.norm() > ROUND_OFF * changes[slot].norm().max(state.v[slot].norm()) {
+                by_support.take(slot, rest.norm());
+            }
+        }
         let stage = self.stage.number + 1;
-        if let Some(slot) = by_support {
+        if let Some(slot) = by_support.slot {
             let node = self.stage.model.node_at(slot);
             let message = format!(
                 "supports of stage {stage} stop what moves, the fastest at node \"{node}\": their impulse on all that \
@@ -167,14 +188,15 @@ impl Dynamics<'_, '_> {
             );
             self.stage.warn(WarningKind::VelocityJump, message);
         }
-        if let Some(slot) = by_motion {
-            let (node, size) = (self.stage.model.node_at(slot), changes[slot].norm());
+        if let Some(slot) = by_motion.slot {
+            let (node, size) = (self.stage.model.node_at(slot), by_motion.size);
             let message = format!(
                 "a motion of stage {stage} changes the velocity of node \"{node}\" at once, by {size:.3e}: let its \
                  history begin with the velocity that the node has there, or let the stage before end at rest"
             );
             self.stage.warn(WarningKind::VelocityJump, message);
         }
+        by_support.slot.is_none()
     }
 
     /// True if the velocity of a motion's node at the start of the stage was known when the deck was read: the motion

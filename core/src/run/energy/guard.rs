@@ -89,6 +89,7 @@ impl EnergyGuard {
     /// The error of the account of the run, if that is worth a warning; `scale` is the largest
     /// energy of the run so far.
     pub fn imbalance(&self, scale: f64) -> Option<Imbalance> {
+        // A stage at rest may have lost what stages before it had.
         if self.largest.max(scale) > self.floor { self.balance.imbalance(scale) } else { None }
     }
 

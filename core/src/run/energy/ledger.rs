@@ -120,7 +120,7 @@ impl Bookkeeper {
 
     /// Motions have jumped in velocity where a stage begins, which is opened next: the kinetic energy that is new is
     /// the work of their impulses.
-    pub fn push(&mut self, entry: Entry) {
+    pub fn book_velocity_jump(&mut self, entry: Entry) {
         if self.first.is_some() {
             self.ledger.external += entry.energy().kinetic - self.ledger.kinetic;
             self.scale = self.scale.max(self.ledger.external.abs());

@@ -72,23 +72,21 @@ impl FrictionAccount {
     /// True if friction and strain take far more energy on the way to a balanced state than loads and
     /// motions give: no path of equilibrium leads there.
     pub fn is_overdrawn(&self, stage: &StageRun) -> bool {
-        self.exchange(stage, NEGLIGIBLE).is_some_and(|exchange| exchange.is_overdrawn())
+        let taken = stage.model.contacts().map_or(0.0, |contacts| -contacts.friction_work(stage.state));
+        let is_notable = self.bookkeeper.as_ref().is_some_and(|books| taken > NEGLIGIBLE * books.scale());
+        is_notable && self.exchange(stage).is_some_and(|exchange| exchange.is_overdrawn())
     }
 
     /// True if loads and motions give far more energy on the way to a balanced state than friction and strain take:
-    /// what is left would set parts in motion. Without an account nothing tells against it.
+    /// what is left would set parts in motion.
     pub fn has_surplus(&self, stage: &StageRun) -> bool {
-        self.exchange(stage, 0.0).is_none_or(|exchange| exchange.has_surplus())
+        self.exchange(stage).is_some_and(|exchange| exchange.has_surplus())
     }
 
-    /// The energies on the way to a balanced state; `None` without an account, or where friction takes no more than a
-    /// part of the largest energy.
-    fn exchange(&self, stage: &StageRun, negligible: f64) -> Option<Exchange> {
+    /// The energies on the way to a balanced state; `None` without an account.
+    fn exchange(&self, stage: &StageRun) -> Option<Exchange> {
         let (bookkeeper, contacts) = (self.bookkeeper.as_ref()?, stage.model.contacts()?);
         let taken = -contacts.friction_work(stage.state);
-        if taken <= negligible * bookkeeper.scale() {
-            return None;
-        }
         // Surfaces that are driven do work by the forces in memory.
         let mut ahead = stage.state.clone();
         contacts.augment(&mut ahead);

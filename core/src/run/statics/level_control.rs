@@ -35,7 +35,7 @@ enum StepOutcome {
     Strayed(Option<Signature>),
     /// Balance, with more friction than energy: perhaps on another branch
     Overdrawn(Option<Signature>),
-    /// Balance, with parts that have slid much further than before: perhaps nothing holds them
+    /// Balance, where something has moved much further than before: perhaps nothing holds it
     SlidAway(Option<Signature>),
     /// No balance
     Failed(NewtonFailure),
@@ -86,16 +86,23 @@ impl LoadLevels<'_, '_> {
         let mut space = SpatialLook::default();
         let loose = begin(self.stage, &mut space)?;
         let levels = Levels::new(self.stage.state.kept(), self.steps, self.approach);
-        let mut stability = Stability::new(self.stage);
+        let stability = Stability::new(self.stage);
         let at_start = stability.signature;
-        if !self.stage.is_nearly_balanced() {
-            // What acts all at once leads away from a state that is none of the path.
-            stability.signature = None;
-        }
+        let begins_unbalanced = !self.stage.is_nearly_balanced();
         self.stage.good.copy_from(self.stage.state);
         let friction_account = FrictionAccount::open(self.stage);
-        LevelControl { stage: self.stage, space, levels, stability, friction_account, at_start, loose, touch: None }
-            .go(0, self.steps)
+        LevelControl {
+            stage: self.stage,
+            space,
+            levels,
+            stability,
+            friction_account,
+            at_start,
+            begins_unbalanced,
+            loose,
+            touch: None,
+        }
+        .go(0, self.steps)
     }
 
     /// Goes on from where a checkpoint has left the stage.
@@ -116,6 +123,7 @@ impl LoadLevels<'_, '_> {
             stability,
             friction_account,
             at_start,
+            begins_unbalanced: false,
             loose: None,
             touch: None,
         }
@@ -132,6 +140,9 @@ struct LevelControl<'s, 'r> {
     friction_account: FrictionAccount,
     /// The signs of pivots before the first level
     at_start: Option<Signature>,
+    /// True until the first step if the start is out of balance, and no state of the path: what acts all at once leads away
+    /// from it
+    begins_unbalanced: bool,
     /// The mechanism that nothing holds before the first level
     loose: Option<Failure>,
     /// The load factor by which points with friction have touched that do not in the last good state
@@ -210,7 +221,10 @@ impl LevelControl<'_, '_> {
                     self.warn_of_friction();
                     self.take_step(signature)?;
                 }
-                StepOutcome::SlidAway(signature) => self.take_step(signature)?,
+                StepOutcome::SlidAway(signature) => {
+                    self.warn_of_slide();
+                    self.take_step(signature)?;
+                }
                 // Nothing tells better.
                 StepOutcome::Strayed(signature) => self.take_step(signature)?,
                 StepOutcome::Jumped(signature) if self.levels.approach != Approach::Path => {
@@ -333,17 +347,16 @@ impl LevelControl<'_, '_> {
         }
         let StageRun { model, good, state, newton, soft, contact_change, .. } = &*self.stage;
         let changes = self.stability.changes_to(signature);
-        if self.stage.rubs()
-            && *contact_change != ContactChange::None
-            && self.levels.may_have_slid_away(model, [good, state])
-            && self.friction_account.has_surplus(self.stage)
-        {
-            return StepOutcome::SlidAway(signature);
-        }
+        let after_change = || {
+            let is_far = self.stage.rubs()
+                && self.levels.has_moved_far(model, [good, state])
+                && self.friction_account.has_surplus(self.stage);
+            if is_far { StepOutcome::SlidAway(signature) } else { StepOutcome::Good(signature) }
+        };
         match contact_change {
-            ContactChange::Slides => return StepOutcome::Good(signature),
+            ContactChange::Slides => return after_change(),
             // A contact that comes or goes is a kink of the path, unless it goes to another branch.
-            ContactChange::Touches if changes == 0 => return StepOutcome::Good(signature),
+            ContactChange::Touches if changes == 0 => return after_change(),
             // Points that touch come and go between iterations, and augmentations push back what the
             // first correction has pressed in.
             ContactChange::None if changes == 0 && state.contacts.touches() => return StepOutcome::Good(signature),
@@ -381,6 +394,7 @@ impl LevelControl<'_, '_> {
         self.friction_account.add_step(self.stage);
         let is_assembled_anew = lists != self.stage.counters.contacts.lists;
         let before = std::mem::replace(&mut self.stability.signature, signature);
+        let before = before.filter(|_| !std::mem::take(&mut self.begins_unbalanced));
         if self.stage.contact_change == ContactChange::None {
             tell_of_points(self.stage, &mut self.space, None, before, signature)?;
         }

@@ -26,8 +26,8 @@ const CLOSE: f64 = 1.0 / 256.0;
 /// which it has jumped.
 const JUMP: f64 = 8.0;
 
-/// The motion, over the length of the scene or in radians, up to which sliding is no jump, however sudden.
-const FAR_SLIDE: f64 = 0.05;
+/// The motion, over the length of the scene or in radians, up to which what slides has not jumped, however sudden it is.
+const FAR: f64 = 0.05;
 
 /// A step that goes against the tangent it set out along, by a cosine below this, may have gone to
 /// another branch.
@@ -132,10 +132,10 @@ impl Levels {
         !self.is_close(to.load - from.load) || distance(model, from, to) > (JUMP * usual).max(NO_MOTION)
     }
 
-    /// True if parts that slide have moved much further in a step than on the way to it.
-    pub fn may_have_slid_away(&self, model: &Model, states: [&State; 2]) -> bool {
+    /// True if something has moved much further in a step than on the way to it.
+    pub fn has_moved_far(&self, model: &Model, states: [&State; 2]) -> bool {
         let usual = self.usual_motion(model, states).unwrap_or(0.0);
-        self.approach != Approach::Straight && distance(model, states[0], states[1]) > (JUMP * usual).max(FAR_SLIDE)
+        self.approach != Approach::Straight && distance(model, states[0], states[1]) > (JUMP * usual).max(FAR)
     }
 
     /// True if a step is so short that what moves far in it has jumped.
