@@ -349,3 +349,37 @@ fn free_rotations_are_named_about_their_axis_in_space() {
         assert!(along > 0.999, "{case}: {place}, down {down:?}");
     }
 }
+
+/// Curvatures of two-node elements with total vectors depend on the orientation; those of higher orders hardly.
+#[test]
+fn only_two_node_elements_depend_on_the_frame() {
+    let told = |order: usize, interpolation: &str| {
+        let run = simulate(&format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1\nEI = 1\n\
+             [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 3\norder = {order}\n\
+             interpolation = \"{interpolation}\"\n[[support]]\nat = \"a\"\nfix = \"all\"\n\
+             [[load]]\nat = \"b\"\nforce = [0, 1, 2]\nmoment = [1, 0, 0]\n[output]\nnodes = [\"b\"]\n\
+             [[stage]]\nkind = \"static\"\nsteps = 4\n"
+        ));
+        run.counters.findings.warnings.iter().any(|warning| warning.kind == WarningKind::FrameDependence)
+    };
+    assert_eq!([1, 2, 3].map(|order| told(order, "total")), [true, false, false]);
+    assert!(!told(1, "relative"));
+}
+
+/// One level past the critical speed of a frame ends in a state that nothing holds about the axis: more levels find the
+/// one before.
+#[test]
+fn frames_past_a_critical_speed_need_more_levels() {
+    let deck = |steps: usize| {
+        format!(
+            "gravity = [0, 0, -10]\n[point]\no = [0, 0, 0]\np = [0, 0, -1]\n[[body]]\nat = \"p\"\nmass = 2\n\
+             inertia = [0.3, 0.3, 0.2]\n[[joint]]\nkind = \"spherical\"\nnodes = [\"p\"]\nat = \"o\"\n\
+             [[spring]]\nat = \"p\"\nstiffness = [0, 0, 0, 0, 0, 1]\n\
+             [[stage]]\nkind = \"static\"\nsteps = {steps}\nframe = {{ spin = [0, 0, 10] }}\n[output]\nnodes = [\"p\"]\n"
+        )
+    };
+    let hint = attempt(&deck(3)).hint.expect("it fails");
+    assert!(hint.contains("critical speed, use more than 3 `steps`"), "{hint}");
+    assert!(attempt(&deck(20)).result.is_ok());
+}

@@ -259,11 +259,11 @@ fn settle(state: &mut State, unsettled: &mut BTreeSet<Slot>, from: Slot, to: Slo
     }
 }
 
-/// The largest relative rotation, in radians, between neighbouring nodes of elements that
-/// interpolate total vectors.
-pub fn widest_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
-    let pairs =
-        elements.iter().filter(|element| element.in_one_chart).flat_map(|element| element.rotations().windows(2));
+/// The largest relative rotation, in radians, between the nodes of two-node elements that interpolate
+/// total vectors.
+pub fn widest_of_two_nodes_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
+    let of_two_nodes = elements.iter().filter(|element| element.in_one_chart && element.rotations().len() == 2);
+    let pairs = of_two_nodes.flat_map(|element| element.rotations().windows(2));
     let angle = |pair: &[Slot]| {
         let [a, b] = [pair[0], pair[1]].map(|slot| Rotation::new(state.q[slot as usize]).r);
         relative_angle(a, b)

@@ -192,7 +192,11 @@ impl<'a> Has<'a> {
         } else if self.plan.model.linear || work.approach() == Some(Approach::Straight) {
             hold.into()
         } else {
-            format!("{hold}: the loads do not stabilise it either")
+            let levels = self.levels().filter(|_| self.stage.rotating);
+            let levels = levels.map_or(String::new(), |levels| {
+                format!("; where one level takes the frame past a critical speed, {levels}")
+            });
+            format!("{hold}: the loads do not stabilise it either{levels}")
         }
     }
 

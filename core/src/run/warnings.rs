@@ -187,7 +187,7 @@ impl StageRun<'_> {
         if self.plane.is_some() {
             return;
         }
-        let angle = charts::widest_in_one_chart(self.state, &self.schedule.charted(self.model).elements);
+        let angle = charts::widest_of_two_nodes_in_one_chart(self.state, &self.schedule.charted(self.model).elements);
         let error = FRAME_ERROR * angle * angle;
         if error > self.issued.frame {
             self.issued.frame = 2.0 * error;
