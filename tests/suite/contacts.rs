@@ -1689,3 +1689,26 @@ fn a_ball_that_rolls_round_in_a_cylinder_comes_up_again() {
         assert!(again.abs() < 0.005 * deepest, "{case} {scheme}: comes up to {again}\n{text}");
     }
 }
+
+/// A ball that is carried round the inside of a cylinder rolls, in levels of any size, with or without smaller steps.
+#[test]
+fn a_ball_that_is_carried_round_rolls_in_any_levels() {
+    for spring in [1e-6, 1e-2] {
+        for (steps, adaptive) in [(10, true), (20, true), (20, false), (40, false)] {
+            let text = format!(
+                "[point]\nb = [0.9, 0, 0]\n[[body]]\nat = \"b\"\nmass = 1\ninertia = [0.004, 0.004, 0.004]\n\
+                 [[spring]]\nat = \"b\"\nstiffness = [0, 0, 0, 0, {spring:e}, 0]\n\
+                 [[motion]]\nat = \"b\"\nux = 0.9\nhistory = \"cx\"\n[[motion]]\nat = \"b\"\nuz = 0.9\nhistory = \"cz\"\n\
+                 [[support]]\nat = \"b\"\nfix = [\"uy\", \"rx\", \"rz\"]\n\
+                 [history.cx]\nexpr = \"(1 + 1e-4)*cos(1.5707963267948966*t) - 1\"\n\
+                 [history.cz]\nexpr = \"(1 + 1e-4)*sin(1.5707963267948966*t)\"\n\
+                 [[surface]]\nname = \"s\"\nkind = \"cylinder\"\nfrom = [0, 0, 0]\nto = [0, 1, 0]\nradius = 1.0\nside = \"inside\"\n\
+                 [[contact]]\nname = \"c\"\nnodes = [\"b\"]\nsurfaces = [\"s\"]\nradius = 0.1\nstiffness = 1e5\nfriction = 0.5\n\
+                 penetration = 1e-2\n[[stage]]\nkind = \"static\"\nsteps = {steps}\nadaptive = {adaptive}\n\
+                 [output]\nnodes = [\"b\"]\ncolumns = [\"rc\"]\n"
+            );
+            let (came, exact) = (simulate(&text).end("b.ry").abs(), 9.0 * std::f64::consts::FRAC_PI_2);
+            assert!((came / exact - 1.0).abs() < 3e-3, "{came} for {exact}\n{text}");
+        }
+    }
+}

@@ -403,3 +403,38 @@ columns = ["contact"]
         assert!((coarse - fine).abs() < 0.02 * normal, "{steps} levels: {coarse} for {fine} of {normal}");
     }
 }
+
+/// A rod that turns drives another one beside it, in levels however large: neither slides, whichever carries the contact.
+#[test]
+fn rods_roll_on_each_other_by_any_angle() {
+    let driven = |radii: [f64; 2], steps: usize, swapped: bool| {
+        let [upper, lower] = radii;
+        let gap = upper + lower;
+        let (first, second) = if swapped { ("l", "u") } else { ("u", "l") };
+        let text = format!(
+            "[point]\na = [0, -0.5, {gap}]\nb = [0, 0.5, {gap}]\nc = [0, -0.6, 0]\nd = [0, 0.6, 0]\n\
+             [section.s]\nEA = 1e6\nGA = 1e6\nGJ = 1e3\nEI = 1e3\n\
+             [[beam]]\nname = \"u\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 6\n\
+             [[beam]]\nname = \"l\"\nsection = \"s\"\nthrough = [\"c\", \"d\"]\nelements = 6\n\
+             [[support]]\nat = \"c\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
+             [[support]]\nat = \"d\"\nfix = [\"ux\", \"uz\", \"rx\", \"rz\"]\n\
+             [[spring]]\nat = \"c\"\nstiffness = [0, 0, 0, 0, 1e-3, 0]\n\
+             [[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"rx\", \"rz\"]\nstages = [1]\n\
+             [[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\"]\nstages = [2]\n\
+             [[support]]\nat = \"b\"\nfix = [\"ux\", \"rx\", \"rz\"]\n\
+             [[support]]\nat = \"a\"\nfix = [\"ry\"]\nstages = [1]\n\
+             [[motion]]\nat = \"a\"\nrotate = [0, 1, 0]\nangle = 3.0\nstages = [2]\n\
+             [[load]]\nalong = \"u\"\nforce = [0, 0, -10]\n\
+             [[contact]]\nname = \"k\"\nbeams = [\"{first}\"]\nwith = [\"{second}\"]\nradius = {{ u = {upper}, l = {lower} }}\n\
+             friction = 0.5\n[[stage]]\nkind = \"static\"\nsteps = 1\n[[stage]]\nkind = \"static\"\nsteps = {steps}\n\
+             [output]\nnodes = [\"c\"]\ncolumns = [\"rc\"]\n"
+        );
+        simulate(&text).end("c.ry")
+    };
+    for radii in [[0.1, 0.05], [0.1, 0.1], [0.05, 0.1]] {
+        for (steps, swapped) in [(5, false), (5, true), (20, false)] {
+            let (came, exact) = (driven(radii, steps, swapped), -3.0 * radii[0] / radii[1]);
+            assert!((came / exact - 1.0).abs() < 3e-3, "{radii:?}, {steps} levels, {swapped}: {came} for {exact}");
+        }
+    }
+}

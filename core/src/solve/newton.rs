@@ -156,6 +156,11 @@ impl Newton {
         self.given = Some(system.revision);
     }
 
+    /// True if the last correction went beyond any motion: next to nothing held what moved.
+    pub fn has_run_away(&self, model: &Model) -> bool {
+        size(model, &self.dq) > DIVERGED_IN_CONTACT
+    }
+
     /// Solves for the equilibrium of `state`. `prescribed_increment` holds increments of held
     /// directions (by slot, global components) that `state` does not yet contain: the first
     /// correction includes them, so that the rest of the structure follows linearly. Afterwards the

@@ -11,7 +11,7 @@
 //! sliding    a = y - y0 - Theta x mr,   da = dy - dy0 + mr~ dTheta - Theta~ (dmr/dm) H dy
 //! ```
 //!
-//! with mr = (m0 + m)/2 of the normals at both ends of the step, or m where the contact was open.
+//! with mr the mean of the normals along the arc from m0 to m, or m where the contact was open.
 //!
 //! With F = p m + t (force on A), internal forces are
 //!
@@ -215,7 +215,7 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         let weight = self.law.weight;
         let half = m.scale(0.5);
         let rolls_about = self.law.carried.rolling_normal(m);
-        let slides = Mat3::identity() - Mat3::skew_mul(self.rolling, self.curvature) * rolls_about.over_normal
+        let slides = Mat3::identity() - Mat3::skew_mul(self.rolling, rolls_about.over_normal * self.curvature)
             + Mat3::skew_mul(rolls_about.value, self.angles.outer(half));
         let friction = Derived {
             value: t.force.scale(weight),

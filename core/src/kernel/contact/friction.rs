@@ -70,14 +70,30 @@ impl CarriedTraction {
         Turn::new(self.normal, n).of(self.force).value
     }
 
-    /// The normal about which a contact has rolled to the normal n since then: the mean of both; n where it was
-    /// open, or where they are more than a right angle apart.
+    /// The normal about which a contact has rolled to the normal n since then: the mean along the arc between them, so
+    /// that a roll of any size on a round surface slides nowhere; n where the contact was open, or where the normals
+    /// are more than a right angle apart.
+    ///
+    /// With b the angle between them it is (n0 + n) tan(b/2)/b, a function of s = tan^2(b/2) = (1 - n0.n)/(1 + n0.n):
+    /// of the continued fraction of atan four terms are taken, which err by 1e-3 at a right angle, 1e-5 at half of it.
     pub fn rolling_normal<T: Real>(&self, n: Vec3<T>) -> RollingNormal<T> {
-        if Vec3::constant(self.normal).dot(n).largest() <= 0.0 {
-            return RollingNormal { value: n, over_normal: T::one() };
+        let n0 = Vec3::constant(self.normal);
+        let cosine = n0.dot(n);
+        if cosine.largest() <= 0.0 {
+            return RollingNormal { value: n, over_normal: Mat3::identity() };
         }
-        let half = T::constant(0.5);
-        RollingNormal { value: (Vec3::constant(self.normal) + n) * half, over_normal: half }
+        let number = T::constant;
+        let one = T::one();
+        let inverse = one / (one + cosine);
+        let s = (one - cosine) * inverse;
+        let inner = one / (number(5.0) + s * number(9.0 / 7.0));
+        let outer = one / (number(3.0) + s * inner * number(4.0));
+        let factor = (one + s * outer) * number(0.5);
+        // d(1/outer)/ds, and with it d factor/d(n0.n)
+        let bend = inner * number(4.0) - s * inner * inner * number(36.0 / 7.0);
+        let over_cosine = -(outer - s * outer * outer * bend) * inverse * inverse;
+        let sum = n0 + n;
+        RollingNormal { value: sum * factor, over_normal: Mat3::identity() * factor + sum.outer(n0 * over_cosine) }
     }
 
     /// It in other axes.
@@ -103,8 +119,8 @@ impl CarriedTraction {
 #[derive(Clone, Copy, Debug)]
 pub struct RollingNormal<T> {
     pub(crate) value: Vec3<T>,
-    /// Its derivative over the normal at the end of the step, times the identity
-    pub(crate) over_normal: T,
+    /// Its derivative over the normal at the end of the step
+    pub(crate) over_normal: Mat3<T>,
 }
 
 /// The smallest rotation n0 -> n, of vectors normal to n0.

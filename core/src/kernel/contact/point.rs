@@ -24,8 +24,8 @@
 //! a = y - y0 - r theta x nr,   y0 = sum N_i y0_i,   theta = sum N_i log(S_i S0_i^T)
 //! ```
 //!
-//! with nr = (n0 + n)/2 of the normals at both ends, or n where the contact was open: with n alone the
-//! way of a ball that rolls on a curved surface would be wrong to first order of the step.
+//! with nr the mean of the normals along the arc from n0 to n, or n where the contact was open: with n
+//! alone the way of a ball that rolls on a curved surface would be wrong to first order of the step.
 //!
 //! The tangent, with dtheta_i = T(theta_i)^-T W_i:
 //!
@@ -302,7 +302,7 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let n = self.distance.normal;
         let curvature = self.distance.curvature;
         let rolls_about = self.law.carried.rolling_normal(n);
-        let slides = Mat3::identity() - Mat3::skew_mul(turned.angle.scale(r), curvature) * rolls_about.over_normal;
+        let slides = Mat3::identity() - Mat3::skew_mul(turned.angle.scale(r), rolls_about.over_normal * curvature);
         Derived {
             value: t.force.scale(weight),
             over_place: (t.over_sliding * slides + t.over_normal * curvature).scale(weight),

@@ -173,7 +173,9 @@ impl StageRun<'_> {
         if attempts.goes_on && touched {
             // Where all points slide nothing may hold a part.
             attempts.goes_on = false;
-        } else if matches!(failure, NewtonFailure::Singular(_)) && !attempts.has_resisted {
+        } else if (matches!(failure, NewtonFailure::Singular(_)) || self.newton.has_run_away(self.model))
+            && !attempts.has_resisted
+        {
             attempts.has_resisted = true;
             attempts.resists = true;
         } else if may_begin_stiffly && attempts.stiff_start == StiffStart::Possible {
