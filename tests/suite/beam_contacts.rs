@@ -710,7 +710,7 @@ fn bars_that_cross_at_small_angles_exchange_their_velocities() {
 fn ends_do_not_go_through_beams_in_one_level() {
     let mut random = Random::new(98);
     let mut compared = 0;
-    for case in 0..100 {
+    for case in 0..20 {
         let beyond = random.range(0.0, 0.012);
         let force = 10.0_f64.powf(random.range(0.2, 2.0));
         let angle = random.range(40.0, 90.0).to_radians();
@@ -742,7 +742,7 @@ fn ends_do_not_go_through_beams_in_one_level() {
             compared += usize::from(in_six > 0.1);
         }
     }
-    assert!(compared >= 50, "{compared}");
+    assert!(compared >= 10, "{compared}");
 }
 
 /// Bars that come near each other from afar in one level or step, and touch or do not: nothing has been passed.
