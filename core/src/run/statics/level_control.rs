@@ -90,19 +90,8 @@ impl LoadLevels<'_, '_> {
         let at_start = stability.signature;
         let begins_unbalanced = !self.stage.is_nearly_balanced();
         self.stage.good.copy_from(self.stage.state);
-        let friction_account = FrictionAccount::open(self.stage);
-        LevelControl {
-            stage: self.stage,
-            space,
-            levels,
-            stability,
-            friction_account,
-            at_start,
-            begins_unbalanced,
-            loose,
-            touch: None,
-        }
-        .go(0, self.steps)
+        let control = LevelControl::new(self.stage, space, levels, stability, at_start);
+        LevelControl { begins_unbalanced, loose, ..control }.go(0, self.steps)
     }
 
     /// Goes on from where a checkpoint has left the stage.
@@ -114,20 +103,7 @@ impl LoadLevels<'_, '_> {
         if is_given {
             self.stage.make_again(|stage| Stability::follow_again(stage, unflattened));
         }
-        let friction_account = FrictionAccount::open(self.stage);
-        let space = SpatialLook::default();
-        LevelControl {
-            stage: self.stage,
-            space,
-            levels,
-            stability,
-            friction_account,
-            at_start,
-            begins_unbalanced: false,
-            loose: None,
-            touch: None,
-        }
-        .go(reached, self.steps)
+        LevelControl::new(self.stage, SpatialLook::default(), levels, stability, at_start).go(reached, self.steps)
     }
 }
 
@@ -149,7 +125,20 @@ struct LevelControl<'s, 'r> {
     touch: Option<f64>,
 }
 
-impl LevelControl<'_, '_> {
+impl<'s, 'r> LevelControl<'s, 'r> {
+    /// From a balanced state that something holds.
+    fn new(
+        stage: &'s mut StageRun<'r>,
+        space: SpatialLook,
+        levels: Levels,
+        stability: Stability,
+        at_start: Option<Signature>,
+    ) -> Self {
+        let friction_account = FrictionAccount::open(stage);
+        let (begins_unbalanced, loose, touch) = (false, None, None);
+        Self { stage, space, levels, stability, friction_account, at_start, begins_unbalanced, loose, touch }
+    }
+
     /// Goes through the levels after the first `reached` ones.
     fn go(&mut self, reached: usize, steps: usize) -> Result<(), Failure> {
         for number in reached + 1..=steps {
