@@ -183,7 +183,7 @@ impl<'a> Has<'a> {
         let hold = "add a support, a spring or a joint that constrains this direction";
         let work = &self.stage.work;
         if work.kind().needs_inertia() {
-            format!("{hold}, or give it mass")
+            format!("{hold}, or give it inertia (`rhoA`, `rhoJ`, `mass` or `inertia`)")
         } else if work.follows_path() {
             format!(
                 "{hold}; if only loads hold the structure (such as a hanging chain), put a static stage with load \

@@ -110,6 +110,34 @@ struct SeenChain<'a> {
 }
 
 impl Chain {
+    /// The number of the node that a candidate is at; `None` between nodes.
+    pub(super) fn node_at(&self, at: &Candidate) -> Option<usize> {
+        let in_nodes = at.s * self.order as f64;
+        let is_node = at.place == Place::Fixed && in_nodes.fract() == 0.0;
+        is_node.then_some(at.element * self.order + in_nodes as usize)
+    }
+
+    /// Elements that have points between nodes: a body alone has none.
+    fn spans(&self) -> usize {
+        if self.order == 0 { 0 } else { self.elements() }
+    }
+
+    /// What the forces of its points act on: elements, and nodes alone, since most points are at nodes.
+    pub(super) fn instances(&self) -> usize {
+        self.spans() + self.nodes.len()
+    }
+
+    /// Shows the nodes of each instance, elements first.
+    pub(super) fn each_instance(&self, show: &mut dyn FnMut(&[ChainNode])) {
+        (0..self.spans()).for_each(|k| show(self.nodes_of(k)));
+        self.nodes.chunks(1).for_each(show);
+    }
+
+    /// The instance that the force of a candidate acts on.
+    pub(super) fn instance_of(&self, at: &Candidate) -> usize {
+        self.node_at(at).map_or(at.element, |node| self.spans() + node)
+    }
+
     /// The part of the length of the beam before a candidate.
     pub(super) fn fraction(&self, at: &Candidate) -> f64 {
         let nodes = self.nodes_of(at.element);
@@ -393,6 +421,9 @@ impl SeenChain<'_> {
     fn add_minima(&self, k: usize, candidates: &mut Vec<Candidate>) {
         if self.chain.order == 0 {
             candidates.extend(self.rim_of_body());
+            return;
+        }
+        if self.surface.is_flat() {
             return;
         }
         let distance = |y: Vec3| self.surface.distance(y).ok();

@@ -41,41 +41,46 @@ pub(super) fn before_of(node: &ChainNode, carrier: &Carrier, at: &State) -> Node
 }
 
 impl<'a> ChainNow<'a> {
-    /// Visits all candidates with their forces, and the system of the element of each.
+    /// Visits all candidates with their forces, and the system of the element or of the node of each.
     pub(super) fn each_point(&self, weights: Weights, visit: &mut dyn FnMut(&PointNow, &ElementSystem)) {
         if self.candidates.is_empty() {
             return;
         }
-        let blocks = 2 * (self.chain.order + 1) + if self.carrier.is_node { 2 } else { 0 };
-        let mut system = ElementSystem::new(blocks);
+        let of_carrier = if self.carrier.is_node { 2 } else { 0 };
+        let system_of = |nodes: usize| ElementSystem::new(nodes * self.laws.blocks_of_node() + of_carrier);
+        let mut of_node = system_of(1);
+        let mut of_element = system_of(self.chain.order + 1);
         for (candidate, predecessors) in self.candidates.iter().zip(&self.predecessors) {
             let partner = predecessors.own.and_then(|number| self.memory?.points.get(number));
             let law = self.law(candidate, predecessors, partner);
+            let node = self.chain.node_at(candidate);
+            let system = if node.is_some() { &mut of_node } else { &mut of_element };
             system.clear_for(weights);
-            let state = match self.chain.order {
-                0 => self.add::<1>(candidate, &law, weights, &mut system),
-                1 => self.add::<2>(candidate, &law, weights, &mut system),
-                2 => self.add::<3>(candidate, &law, weights, &mut system),
-                _ => self.add::<4>(candidate, &law, weights, &mut system),
+            let first = node.unwrap_or(candidate.element * self.chain.order);
+            let state = match node.map_or(self.chain.order, |_| 0) {
+                0 => self.add::<1>(candidate, first, &law, weights, system),
+                1 => self.add::<2>(candidate, first, &law, weights, system),
+                2 => self.add::<3>(candidate, first, &law, weights, system),
+                _ => self.add::<4>(candidate, first, &law, weights, system),
             };
             let Some(state) = state else { continue };
-            visit(&PointNow { candidate, predecessors, partner, law: &law, state: &state }, &system);
+            visit(&PointNow { candidate, predecessors, partner, law: &law, state: &state }, system);
         }
     }
 
-    /// Adds forces and tangent of a candidate; `None` where the surface has no normal.
+    /// Adds forces and tangent of a candidate on the N nodes from `first` on; `None` where the surface has no normal.
     fn add<const N: usize>(
         &self,
         candidate: &Candidate,
+        first: usize,
         law: &ContactLaw,
         weights: Weights,
         out: &mut ElementSystem,
     ) -> Option<PointState> {
         let shape = shape::<N>(candidate);
-        let nodes = self.chain.nodes_of(candidate.element);
-        let first = candidate.element * self.chain.order;
+        let nodes = &self.chain.nodes[first..first + N];
         let turning = |i: usize| self.turning(&nodes[i], first + i);
-        let turning: Option<[NodeTurning; N]> = law.friction.map(|_| std::array::from_fn(turning));
+        let turning: Option<[NodeTurning; N]> = self.laws.rubs().then(|| std::array::from_fn(turning));
         let nodes: [ContactNode; N] = std::array::from_fn(|i| self.node(&nodes[i]));
         let place = (0..N).fold(Vec3::ZERO, |sum, i| sum + nodes[i].place * shape.values[i]);
         let distance = candidate.distance(&self.surface.surface, self.carrier.on_surface(place))?;

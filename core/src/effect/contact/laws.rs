@@ -128,4 +128,9 @@ impl ContactLaws {
     pub fn rubs(&self) -> bool {
         self.friction != [0.0; 2]
     }
+
+    /// Blocks of a node of a beam or a body that touches a surface: its displacements, and with friction its rotation.
+    pub(super) fn blocks_of_node(&self) -> usize {
+        if self.rubs() { 2 } else { 1 }
+    }
 }

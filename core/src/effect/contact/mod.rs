@@ -116,7 +116,7 @@ impl SurfaceContacts {
 
     /// The number of the first instance of a chain.
     fn first_instance(&self, number: usize) -> usize {
-        self.chains[..number].iter().map(|chain| chain.elements()).sum()
+        self.chains[..number].iter().map(Chain::instances).sum()
     }
 
     /// True if no chain touches, or touched, and none has friction, which follows nodes that do not
@@ -328,10 +328,11 @@ impl Effect for SurfaceContacts {
         let mut connectivity = Connectivity::default();
         for chain in &self.chains {
             let carrier = self.surfaces[chain.surface].slots();
-            for k in 0..chain.elements() {
-                let nodes = chain.nodes_of(k).iter().flat_map(|node| [node.node.u, node.node.p]);
-                connectivity.push(nodes.chain(carrier.into_iter().flatten()));
-            }
+            let blocks = self.laws[chain.contact].blocks_of_node();
+            chain.each_instance(&mut |nodes| {
+                let slots = nodes.iter().flat_map(|node| [node.node.u, node.node.p].into_iter().take(blocks));
+                connectivity.push(slots.chain(carrier.into_iter().flatten()));
+            });
         }
         connectivity
     }
@@ -362,7 +363,7 @@ impl Effect for SurfaceContacts {
             let first = self.first_instance(number);
             chain.each_point(weights, &mut |point, system| {
                 if point.state.status() != Status::Open {
-                    out.add(first + point.candidate.element, system);
+                    out.add(first + chain.chain.instance_of(point.candidate), system);
                 }
             });
         });

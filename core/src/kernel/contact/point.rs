@@ -175,8 +175,8 @@ struct Seen<T> {
 }
 
 /// Adds the forces of a contact point to `out`, and the tangent of the weights: blocks x_1, P_1, …,
-/// x_N, P_N and, for a carrier with unknowns, c, P_s. `distance` is that of the surface at
-/// [`Carrier::on_surface`] of the point. Only friction needs how nodes are turned.
+/// x_N, P_N, or x_1, …, x_N where it is not given how nodes are turned, and, for a carrier with unknowns, c, P_s.
+/// `distance` is that of the surface at [`Carrier::on_surface`] of the point. Only friction needs how nodes are turned.
 pub fn add_point<const N: usize, T: Real>(
     (nodes, turning): (&[ContactNode<T>; N], Option<&[NodeTurning<T>; N]>),
     shape: &ShapeAt<N, T>,
@@ -190,18 +190,21 @@ pub fn add_point<const N: usize, T: Real>(
     let gap = distance.value - T::constant(law.radius);
     let normal_force = law.normal.force(gap, distance.normal.dot(seen.rate));
     let mut state = PointState { gap, normal_force, normal: distance.normal, traction: Traction::none() };
+    let blocks = if turning.is_some() { NodeBlocks::PlaceAndRotation } else { NodeBlocks::Place };
     if state.status() == Status::Open {
         return state;
     }
     match law.friction.as_ref().zip(turning) {
-        None => Point { nodes, shape, carrier, distance, law, seen, turned: None, state: &state }.add(weights, out),
+        None => {
+            Point { nodes, blocks, shape, carrier, distance, law, seen, turned: None, state: &state }.add(weights, out);
+        }
         Some((friction, turning)) => {
             let turned = &Turned::new(turning, shape, &carrier.rotation.r);
             let rolled = turned.angle.cross(law.carried.rolling_normal(distance.normal).value).scale(law.radius);
             let sliding = seen.place - turned.before(&shape.values) - rolled;
             state.traction = friction.traction(&law.carried, distance.normal, normal_force.force, sliding);
             let turned = Some(turned);
-            Point { nodes, shape, carrier, distance, law, seen, turned, state: &state }.add(weights, out);
+            Point { nodes, blocks, shape, carrier, distance, law, seen, turned, state: &state }.add(weights, out);
         }
     }
     state
@@ -220,6 +223,7 @@ impl<T: Real> Seen<T> {
 /// A contact point with a force.
 struct Point<'a, const N: usize, T> {
     nodes: &'a [ContactNode<T>; N],
+    blocks: NodeBlocks,
     shape: &'a ShapeAt<N, T>,
     carrier: &'a Carrier<T>,
     distance: &'a Distance<T>,
@@ -229,14 +233,28 @@ struct Point<'a, const N: usize, T> {
     state: &'a PointState<T>,
 }
 
-/// The block of the displacements of node `i`; the block of its rotation follows.
-const fn block_of(i: usize) -> usize {
-    2 * i
+/// The blocks of a node in the system of a contact point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum NodeBlocks {
+    /// Its displacements
+    Place,
+    /// Its displacements, and its rotation
+    PlaceAndRotation,
 }
 
 impl<const N: usize, T: Real> Point<'_, N, T> {
+    /// The block of the displacements of node `i`; with friction the block of its rotation follows.
+    const fn block_of(&self, i: usize) -> usize {
+        match self.blocks {
+            NodeBlocks::Place => i,
+            NodeBlocks::PlaceAndRotation => 2 * i,
+        }
+    }
+
     /// The block of the carrier's displacements; the block of its rotation follows.
-    const CARRIER: usize = 2 * N;
+    const fn carrier_block(&self) -> usize {
+        self.block_of(N)
+    }
 
     fn add(&self, weights: Weights, out: &mut ElementSystem<T>) {
         let friction = self.traction();
@@ -248,8 +266,8 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         }
         if self.carrier.is_node {
             let rotation = &self.carrier.rotation;
-            out.add_force(Self::CARRIER, rotation.r * force.value);
-            out.add_force(Self::CARRIER + 1, rotation.t.transpose_mul(arm.cross(force.value)));
+            out.add_force(self.carrier_block(), rotation.r * force.value);
+            out.add_force(self.carrier_block() + 1, rotation.t.transpose_mul(arm.cross(force.value)));
         }
         if weights.stiffness == 0.0 && weights.damping == 0.0 {
             return;
@@ -321,26 +339,32 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
 
     /// Shows the forces on node `i` for the factor N_i (or its derivative).
     fn node_forces(&self, i: usize, factor: T, force: Vec3<T>, moment: Vec3<T>, mut show: impl FnMut(usize, Vec3<T>)) {
-        show(block_of(i), -(self.carrier.rotation.r * force) * factor);
+        show(self.block_of(i), -(self.carrier.rotation.r * force) * factor);
         if let Some(turned) = self.turned {
             let material = turned.rotations[i].transpose_mul(moment);
-            show(block_of(i) + 1, turned.nodes[i].rotation.t.transpose_mul(material) * (factor * self.law.radius));
+            show(self.block_of(i) + 1, turned.nodes[i].rotation.t.transpose_mul(material) * (factor * self.law.radius));
         }
     }
 
     /// Adds the derivatives of F, m and b, without those of Q, T and S.
     fn add_columns(&self, force: &Derived<T>, moment: &Derived<T>, weights: Weights, out: &mut ElementSystem<T>) {
-        let mut displacements = [(Self::CARRIER, -T::one()); MAX_NODES + 1];
+        let mut displacements = [(self.carrier_block(), -T::one()); MAX_NODES + 1];
         for i in 0..N {
-            displacements[i] = (block_of(i), self.shape.values[i]);
+            displacements[i] = (self.block_of(i), self.shape.values[i]);
             if let Some(column) = self.node_rotation(i, weights) {
-                self.add_column(&[(block_of(i) + 1, T::one())], &column, force, moment, out);
+                self.add_column(&[(self.block_of(i) + 1, T::one())], &column, force, moment, out);
             }
         }
         let count = if self.carrier.is_node { N + 1 } else { N };
         self.add_column(&displacements[..count], &self.displacement(weights), force, moment, out);
         if self.carrier.is_node {
-            self.add_column(&[(Self::CARRIER + 1, T::one())], &self.carrier_rotation(weights), force, moment, out);
+            self.add_column(
+                &[(self.carrier_block() + 1, T::one())],
+                &self.carrier_rotation(weights),
+                force,
+                moment,
+                out,
+            );
         }
     }
 
@@ -392,21 +416,21 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let mut add =
             |row: usize, of_row: Mat3<T>| blocks.iter().for_each(|&(block, f)| out.add_tangent(row, block, of_row * f));
         for i in 0..N {
-            add(block_of(i), -spatial * self.shape.values[i]);
+            add(self.block_of(i), -spatial * self.shape.values[i]);
         }
         if let Some(turned) = self.turned {
             let d_moment = moment.over(column);
             for i in 0..N {
                 let factor = self.shape.values[i] * self.law.radius;
                 let material = turned.rotations[i].transpose_matmul(d_moment);
-                add(block_of(i) + 1, turned.nodes[i].rotation.t.transpose_matmul(material) * factor);
+                add(self.block_of(i) + 1, turned.nodes[i].rotation.t.transpose_matmul(material) * factor);
             }
         }
         if self.carrier.is_node {
             let d_arm = column.place - self.distance.curvature * column.place.scale(self.law.radius);
             let turned = Mat3::skew_mul(self.arm(), d_force) - Mat3::skew_mul(force.value, d_arm);
-            add(Self::CARRIER, spatial);
-            add(Self::CARRIER + 1, carrier.t.transpose_matmul(turned));
+            add(self.carrier_block(), spatial);
+            add(self.carrier_block() + 1, carrier.t.transpose_matmul(turned));
         }
     }
 
@@ -416,11 +440,11 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         if self.carrier.is_node {
             let turned = carrier.r * Mat3::skew_mul(force.value, carrier.t.scale(weight));
             for i in 0..N {
-                out.add_tangent(block_of(i), Self::CARRIER + 1, turned * self.shape.values[i]);
+                out.add_tangent(self.block_of(i), self.carrier_block() + 1, turned * self.shape.values[i]);
             }
-            out.add_tangent(Self::CARRIER, Self::CARRIER + 1, -turned);
+            out.add_tangent(self.carrier_block(), self.carrier_block() + 1, -turned);
             let about = carrier.c2(self.arm().cross(force.value)).scale(weight);
-            out.add_tangent(Self::CARRIER + 1, Self::CARRIER + 1, about);
+            out.add_tangent(self.carrier_block() + 1, self.carrier_block() + 1, about);
         }
         let Some(turned) = self.turned else { return };
         let m = moment.value;
@@ -430,9 +454,9 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
             let s = &turned.rotations[i];
             let back = node.t.transpose() * s.transpose() * factor;
             let own = back * Mat3::skew_mul(m, *s * node.t) + node.c2(s.transpose_mul(m)) * factor;
-            out.add_tangent(block_of(i) + 1, block_of(i) + 1, own);
+            out.add_tangent(self.block_of(i) + 1, self.block_of(i) + 1, own);
             if self.carrier.is_node {
-                out.add_tangent(block_of(i) + 1, Self::CARRIER + 1, -(back * Mat3::skew_mul(m, carrier.t)));
+                out.add_tangent(self.block_of(i) + 1, self.carrier_block() + 1, -(back * Mat3::skew_mul(m, carrier.t)));
             }
         }
     }
@@ -453,13 +477,13 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let mut count = 0;
         for i in 0..N {
             let f_sq = *q * (bent * self.shape.values[i] + n * self.shape.slopes[i]);
-            columns[count] = (block_of(i), f_sq * factor);
+            columns[count] = (self.block_of(i), f_sq * factor);
             count += 1;
         }
         if self.carrier.is_node {
             let turned = self.seen.place.cross(bent) + z.cross(n);
-            columns[count] = (Self::CARRIER, -(*q * bent) * factor);
-            columns[count + 1] = (Self::CARRIER + 1, -self.carrier.rotation.t.transpose_mul(turned) * factor);
+            columns[count] = (self.carrier_block(), -(*q * bent) * factor);
+            columns[count + 1] = (self.carrier_block() + 1, -self.carrier.rotation.t.transpose_mul(turned) * factor);
             count += 2;
         }
         let columns = &columns[..count];
@@ -481,8 +505,8 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
             let carrier = &self.carrier.rotation;
             let d_arm = change.place - self.distance.curvature * change.place.scale(self.law.radius);
             let turned = d_arm.cross(force.value) + self.arm().cross(d_force);
-            show(Self::CARRIER, carrier.r * d_force);
-            show(Self::CARRIER + 1, carrier.t.transpose_mul(turned));
+            show(self.carrier_block(), carrier.r * d_force);
+            show(self.carrier_block() + 1, carrier.t.transpose_mul(turned));
         }
     }
 

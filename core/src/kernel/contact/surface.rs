@@ -148,6 +148,11 @@ impl Surface {
         }
     }
 
+    /// True for a plane: the closest point of an element has no place of its own there, since the element alone bends.
+    pub fn is_flat(&self) -> bool {
+        matches!(self.shape, Shape::Plane { .. })
+    }
+
     /// True if points inside of a body may have no normal: on an axis, at a centre.
     pub fn may_lose_points(&self) -> bool {
         let has_axis = match &self.shape {
