@@ -1594,6 +1594,65 @@ fn a_ladder_that_slides_away_is_told() {
     assert!(jumps >= 3, "{jumps}");
 }
 
+/// A ball that a force pushes into a narrowing hole, against a spring, fills it where its radius is that of the
+/// hole; there the force is that of a ring, N sin(half angle) of the cone. It may begin on the axis or beside it.
+#[test]
+fn what_fills_a_funnel_stops_in_it() {
+    let random = &mut Random::new(61);
+    for k in 0..24 {
+        let unit = 10.0_f64.powf(random.range(-3.0, 3.0));
+        let [along, aside] = random.axes();
+        let (wide, narrow) = (0.5, 0.2);
+        let tilt = wide - narrow;
+        let radius = random.range(0.25, 0.36);
+        let (offset, steps) = ([0.0, 1e-12, 1e-7, 1e-3, 0.03][k % 5], [1, 7, 40][k % 3]);
+        let force = random.range(11.0, 13.5);
+        let place = |distance: f64, beside: f64| {
+            let at = (along * distance + aside * beside) * unit;
+            format!("[{:e}, {:e}, {:e}]", at.0[0], at.0[1], at.0[2])
+        };
+        let surface = if k % 2 == 0 {
+            let [from, to] = [place(0.0, 0.0), place(1.0, 0.0)];
+            format!("kind = \"cone\"\nfrom = {from}\nto = {to}\nside = \"inside\"\nradius = ")
+        } else {
+            format!(
+                "kind = \"tube\"\nthrough = [{}, {}]\nside = \"inside\"\nradius = ",
+                place(0.0, 0.0),
+                place(1.0, 0.0)
+            )
+        };
+        let soft = 20.0 / unit;
+        let deck = format!(
+            "[point]\nball = {start}\n[[body]]\nat = \"ball\"\nmass = 1\ninertia = [{inertia:e}, {inertia:e}, {inertia:e}]\n\
+             [[spring]]\nat = \"ball\"\nstiffness = [{soft:e}, {soft:e}, {soft:e}, {turn:e}, {turn:e}, {turn:e}]\n\
+             [[load]]\nat = \"ball\"\nforce = {push}\n[[surface]]\nname = \"hole\"\n{surface}[{wide:e}, {narrow:e}]\n\
+             [[contact]]\nname = \"c\"\nnodes = [\"ball\"]\nsurfaces = [\"hole\"]\nradius = {radius:e}\nstiffness = {stiffness:e}\n\
+             [[stage]]\nkind = \"static\"\nsteps = {steps}\n[output]\nnodes = [\"ball\"]\ncolumns = [\"x\", \"contact\"]\n",
+            start = place(0.3, offset),
+            inertia = 0.01 * unit * unit,
+            turn = unit,
+            push = {
+                let push = along * force;
+                format!("[{:e}, {:e}, {:e}]", push.0[0], push.0[1], push.0[2])
+            },
+            wide = wide * unit,
+            narrow = narrow * unit,
+            radius = radius * unit,
+            stiffness = 1e4 / unit,
+        );
+        let run = simulate(&deck);
+        let at = Vec3(["x", "y", "z"].map(|axis| run.end(&format!("ball.{axis}")))) * (1.0 / unit);
+        let reached = at.dot(along);
+        let fills = (wide - radius) / tilt;
+        // What `penetration` allows, and what is rounded off around the axis.
+        assert!((reached - fills).abs() < (1e-3 * radius + 1e-4 * narrow) / tilt, "{reached} for {fills}\n{deck}");
+        assert!((at - along * reached).norm() < 1e-4, "{at:?}\n{deck}");
+        let normal = run.end("c.normal") * tilt;
+        let left = force - 20.0 * (reached - 0.3);
+        assert!((normal - left).abs() < 1e-6 * force, "{normal} for {left}\n{deck}");
+    }
+}
+
 /// The least angle to the floor at which friction `mu` at both ends holds a rigid ladder: atan((1 - mu^2)/(2 mu)).
 fn least_angle_of_ladder(mu: f64) -> f64 {
     ((1.0 - mu * mu) / (2.0 * mu)).atan()

@@ -157,8 +157,8 @@ impl Chain {
         let of_edges = |k: usize| {
             let gap = |candidate: Candidate| {
                 let place = seen.place(k, candidate.s);
-                let of_edge = candidate.distance(surface, place).map_or(f64::INFINITY, |it| it.value - self.radius);
-                of_edge.min(gap(place))
+                let edge = candidate.edge.and_then(|number| surface.edge(number)?.value(place));
+                edge.map_or(f64::INFINITY, |value| value - self.radius).min(gap(place))
             };
             let at_edges = if self.order == 0 { Vec::from_iter(seen.rim_of_body()) } else { seen.closest_to_edges(k) };
             at_edges.into_iter().map(gap).fold(f64::INFINITY, f64::min)

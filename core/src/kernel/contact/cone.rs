@@ -1,9 +1,9 @@
 //! The hull of two spheres: a capsule if their radii are equal, otherwise a cone with round ends.
 //! The formulas are those of [`super::surface`].
 
-use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, Undefined, sphere};
+use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, RoundedLength, Undefined, sphere};
 use crate::scalar::Real;
-use crate::tensor::Vec3;
+use crate::tensor::{Mat3, Vec3};
 
 /// A line segment with the spheres at its ends whose hull is a capsule (equal radii) or a cone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,8 +31,8 @@ impl Cone {
         (tilt.abs() < 1.0 && across > 0.0).then_some(Self { from, axis, length, radii, tilt, across })
     }
 
-    /// The distance from the hull, outside of it.
-    pub fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
+    /// The distance from the hull, outside of it. `blunt`: see [`RoundedLength`].
+    pub(super) fn distance<T: Real>(&self, y: Vec3<T>, blunt: f64) -> Result<Distance<T>, Undefined> {
         let e = Vec3::constant(self.axis);
         let d = y - Vec3::constant(self.from);
         let z = e.dot(d);
@@ -40,10 +40,18 @@ impl Cone {
         let l = q.norm();
         let s = z.largest() - l.largest() * (self.tilt / self.across);
         if s <= 0.0 {
-            return sphere(d, self.radii[0]);
+            return sphere(d, self.radii[0], blunt);
         }
         if s >= self.length {
-            return sphere(d - e * T::constant(self.length), self.radii[1]);
+            return sphere(d - e * T::constant(self.length), self.radii[1], blunt);
+        }
+        if let Some(rounded) = RoundedLength::of(q, blunt) {
+            return Ok(Distance {
+                value: rounded.value * self.across + z * self.tilt - T::constant(self.radii[0]),
+                normal: q * (rounded.slope * self.across) + e.scale(self.tilt),
+                curvature: rounded.hessian(q, Mat3::identity() - e.outer(e)).scale(self.across),
+                feature: Feature::Face,
+            });
         }
         if l.largest() <= MIN_RELATIVE_DISTANCE * self.radii[0].max(self.radii[1]) {
             return Err(Undefined::Axis);

@@ -18,7 +18,7 @@
 //! wall: it does no work where the wire slides along itself.
 
 use super::along::intervals_of_convex;
-use super::distance::{Distance, Feature, Side, Undefined, cylinder, sphere};
+use super::distance::{Distance, Feature, Rounding, Side, Undefined, cylinder, sphere};
 use super::surface::{Shape, Surface, torus};
 use super::tube::Rim;
 use crate::scalar::Real;
@@ -187,8 +187,20 @@ impl Edge {
         match self {
             Self::Straight(edge) => edge.distance(y),
             Self::Rim(rim, _) => {
-                let ring = torus(y - Vec3::constant(rim.centre), rim.outward, rim.radius, 0.0)?;
+                let ring =
+                    torus(y - Vec3::constant(rim.centre), rim.outward, [rim.radius, 0.0], Rounding::of(Side::Outside))?;
                 Ok(Distance { feature: Feature::Edge, ..ring })
+            }
+        }
+    }
+
+    /// The exact distance of the point `y`.
+    pub fn value(&self, y: Vec3) -> Option<f64> {
+        match self {
+            Self::Straight(edge) => edge.distance(y).ok().map(|distance| distance.value),
+            Self::Rim(rim, _) => {
+                let [beyond, across] = rim.along_and_across(y);
+                Some(beyond.hypot(across - rim.radius))
             }
         }
     }
@@ -223,10 +235,10 @@ impl StraightEdge {
         let d = y - Vec3::constant(self.middle);
         let along = Vec3::constant(self.along).dot(d).largest();
         if along.abs() <= self.half {
-            Ok(Distance { feature: Feature::Edge, ..cylinder(d, self.along, 0.0)? })
+            Ok(Distance { feature: Feature::Edge, ..cylinder(d, self.along, 0.0, 0.0)? })
         } else {
             let corner = self.along * (self.half * along.signum());
-            Ok(Distance { feature: Feature::Corner, ..sphere(d - Vec3::constant(corner), 0.0)? })
+            Ok(Distance { feature: Feature::Corner, ..sphere(d - Vec3::constant(corner), 0.0, 0.0)? })
         }
     }
 

@@ -121,7 +121,7 @@ impl TriangleMesh {
                     return Ok(self.to_face(above, y));
                 }
                 let start = Vec3::constant(self.parts.place(edge.ends[0]));
-                let outside = Distance { feature: Feature::Edge, ..cylinder(y - start, edge.along, 0.0)? };
+                let outside = Distance { feature: Feature::Edge, ..cylinder(y - start, edge.along, 0.0, 0.0)? };
                 Ok(if (normals[0] + normals[1]).dot(q) < 0.0 { outside.reversed() } else { outside })
             }
             Part::Corner(corner) => {
@@ -140,7 +140,7 @@ impl TriangleMesh {
                     return self.to_part(Part::Edge(edge), face, y, here);
                 }
                 let at = Vec3::constant(self.parts.place(corner));
-                let outside = Distance { feature: Feature::Corner, ..sphere(y - at, 0.0)? };
+                let outside = Distance { feature: Feature::Corner, ..sphere(y - at, 0.0, 0.0)? };
                 Ok(if self.parts.normals[corner as usize].dot(d) < 0.0 { outside.reversed() } else { outside })
             }
         }

@@ -262,7 +262,7 @@ fn refine<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB], star
 
 /// The local minima of the distance from a point, between the ends of an element.
 pub fn closest_to_point<const N: usize>(point: Vec3, nodes: &[Vec3; N]) -> Minima {
-    minima(nodes, intervals_of_convex(N), &|y| sphere(y - point, 0.0).ok())
+    minima(nodes, intervals_of_convex(N), &|y| sphere(y - point, 0.0, 0.0).ok())
 }
 
 #[cfg(test)]

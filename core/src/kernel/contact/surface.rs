@@ -28,7 +28,9 @@
 
 use super::along::{MOST_INTERVALS, intervals_of_convex};
 use super::cone::Cone;
-use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, Side, Undefined, cylinder, plane, sphere};
+use super::distance::{
+    Distance, Feature, MIN_RELATIVE_DISTANCE, RoundedLength, Rounding, Side, Undefined, cylinder, plane, sphere,
+};
 use super::mesh::TriangleMesh;
 use super::tube::Tube;
 use crate::scalar::Real;
@@ -105,7 +107,11 @@ pub struct Surface {
 impl Surface {
     /// The signed distance of the point `y`, in the axes of the carrier.
     pub fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
-        let outside = self.shape.distance(y)?;
+        self.rounded_distance(y, Rounding::of(self.side))
+    }
+
+    fn rounded_distance<T: Real>(&self, y: Vec3<T>, rounding: Rounding) -> Result<Distance<T>, Undefined> {
+        let outside = self.shape.distance(y, rounding)?;
         match self.side {
             Side::Outside => Ok(outside),
             Side::Inside => Ok(outside.reversed()),
@@ -131,18 +137,19 @@ impl Surface {
         at_least.max((needed as usize).min(MOST_INTERVALS))
     }
 
-    /// The signed distance of a point, also where it has no normal: on an axis, at a centre. There
+    /// The exact signed distance of a point, also where it has no normal: on an axis, at a centre. There
     /// it is that of a point beside it, by a millionth of `size` at first, which is a length of the
     /// order of gaps. `None` where nothing is there to touch.
     pub fn value(&self, y: Vec3, size: f64) -> Option<f64> {
         // Not along any axis that users choose.
         const ASIDE: Vec3 = Vec3([0.613, 0.524, 0.592]);
-        match self.distance(y) {
+        let distance = |y: Vec3| self.rounded_distance(y, Rounding::NONE);
+        match distance(y) {
             Ok(distance) => Some(distance.value),
             Err(Undefined::BeyondEnd) => None,
             Err(Undefined::Centre | Undefined::Axis | Undefined::Ring | Undefined::NotUnique) => {
                 let steps = [1e-6, 1e-3, 1.0];
-                let beside = steps.into_iter().find_map(|step| self.distance(y + ASIDE * (step * size)).ok());
+                let beside = steps.into_iter().find_map(|step| distance(y + ASIDE * (step * size)).ok());
                 beside.map(|distance| distance.value)
             }
         }
@@ -172,18 +179,23 @@ impl Surface {
 }
 
 impl Shape {
-    fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
+    /// The distance from outside.
+    fn distance<T: Real>(&self, y: Vec3<T>, rounding: Rounding) -> Result<Distance<T>, Undefined> {
         match self {
             Self::Plane { point, normal } => Ok(plane(y, *point, *normal)),
             Self::Sphere { centre, radius } => {
-                let ball = sphere(y - Vec3::constant(*centre), *radius)?;
+                let ball = sphere(y - Vec3::constant(*centre), *radius, rounding.inside * radius)?;
                 Ok(Distance { feature: Feature::Face, ..ball })
             }
-            Self::Cylinder { point, axis, radius } => cylinder(y - Vec3::constant(*point), *axis, *radius),
-            Self::Cone(cone) => cone.distance(y),
-            Self::Torus { centre, axis, ring, radius } => torus(y - Vec3::constant(*centre), *axis, *ring, *radius),
+            Self::Cylinder { point, axis, radius } => {
+                cylinder(y - Vec3::constant(*point), *axis, *radius, rounding.inside * radius)
+            }
+            Self::Cone(cone) => cone.distance(y, rounding.inside * cone.least_radius()),
+            Self::Torus { centre, axis, ring, radius } => {
+                torus(y - Vec3::constant(*centre), *axis, [*ring, *radius], rounding)
+            }
             Self::Box { centre, axes, half } => Ok(cuboid(y - Vec3::constant(*centre), *axes, *half)),
-            Self::Tube(tube) => tube.distance(y),
+            Self::Tube(tube) => tube.distance(y, rounding),
             Self::Mesh(mesh) => mesh.distance(y),
         }
     }
@@ -202,16 +214,46 @@ impl Shape {
     }
 }
 
-pub(super) fn torus<T: Real>(d: Vec3<T>, axis: Vec3, ring: f64, radius: f64) -> Result<Distance<T>, Undefined> {
+/// The distance from a torus, for the place `d` of the point from its centre.
+pub(super) fn torus<T: Real>(
+    d: Vec3<T>,
+    axis: Vec3,
+    [ring, radius]: [f64; 2],
+    rounding: Rounding,
+) -> Result<Distance<T>, Undefined> {
     let e = Vec3::constant(axis);
     let z = e.dot(d);
     let q = d - e * z;
+    if let Some(rounded) = RoundedLength::of(q, rounding.hole * (ring - radius)) {
+        let v = [rounded.value - T::constant(ring), z];
+        let s = (v[0] * v[0] + v[1] * v[1]).sqrt();
+        let inverse = T::one() / s;
+        let n = q * (rounded.slope * v[0] * inverse) + e * (z * inverse);
+        let slope = q * rounded.slope;
+        let bent = slope.outer(slope) + rounded.hessian(q, Mat3::identity() - e.outer(e)) * v[0] + e.outer(e);
+        return Ok(Distance {
+            value: s - T::constant(radius),
+            normal: n,
+            curvature: (bent - n.outer(n)) * inverse,
+            feature: Feature::Face,
+        });
+    }
     let l = q.norm();
     if l.largest() <= MIN_RELATIVE_DISTANCE * ring {
         return Err(Undefined::Axis);
     }
     let m = q * (T::one() / l);
     let v = m * (l - T::constant(ring)) + e * z;
+    if let Some(rounded) = RoundedLength::of(v, rounding.inside * radius) {
+        let b = e.cross(m);
+        let across = Mat3::identity() - b.outer(b) * (T::constant(ring) / l);
+        return Ok(Distance {
+            value: rounded.value - T::constant(radius),
+            normal: v * rounded.slope,
+            curvature: rounded.hessian(v, across),
+            feature: Feature::Face,
+        });
+    }
     let s = v.norm();
     if s.largest() <= MIN_RELATIVE_DISTANCE * radius {
         return Err(Undefined::Ring);
@@ -392,7 +434,7 @@ pub(super) mod tests {
         let e = Vec3::UNIT[2];
         let undefined = |shape: Shape, y: Vec3| Surface { shape, side: Side::Outside }.distance(y).unwrap_err();
         let capsule = || Shape::Cone(Cone::new(o, e, [0.2, 0.2]).unwrap());
-        let torus = || Shape::Torus { centre: o, axis: e, ring: 2.0, radius: 0.5 };
+        let torus = Shape::Torus { centre: o, axis: e, ring: 2.0, radius: 0.5 };
         let line = [o, e, e * 2.0];
         let smooth = |ends| Shape::Tube(Tube::smooth(&line, &[0.2; 3], ends).unwrap());
         let straight = |ends| Shape::Tube(Tube::straight(&line, &[0.2; 3], ends).unwrap());
@@ -400,8 +442,7 @@ pub(super) mod tests {
         assert_eq!(undefined(Shape::Cylinder { point: o, axis: e, radius: 1.0 }, e), Undefined::Axis);
         assert_eq!(undefined(capsule(), e), Undefined::Centre);
         assert_eq!(undefined(capsule(), e * 0.5), Undefined::Axis);
-        assert_eq!(undefined(torus(), e), Undefined::Axis);
-        assert_eq!(undefined(torus(), Vec3([2.0, 0.0, 0.0])), Undefined::Ring);
+        assert_eq!(undefined(torus, Vec3([2.0, 0.0, 0.0])), Undefined::Ring);
         for ends in [TubeEnds::Open, TubeEnds::Round] {
             assert_eq!(undefined(smooth(ends), e * 0.7), Undefined::Axis);
             assert_eq!(undefined(straight(ends), e * 0.7), Undefined::Axis);
@@ -409,6 +450,49 @@ pub(super) mod tests {
         for beyond in [-0.1, 2.1] {
             assert_eq!(undefined(smooth(TubeEnds::Open), Vec3([0.1, 0.0, beyond])), Undefined::BeyondEnd);
             assert_eq!(undefined(straight(TubeEnds::Open), Vec3([0.1, 0.0, beyond])), Undefined::BeyondEnd);
+        }
+    }
+
+    /// Surfaces with a hole around the z axis, or around a ring, each with a point of the middle of its hole.
+    fn holes() -> Vec<(Surface, Vec3)> {
+        let (o, e) = (Vec3::ZERO, Vec3::UNIT[2]);
+        let (line, radii) = ([o, e, e * 2.0], [0.5, 0.4, 0.2]);
+        let torus = || Shape::Torus { centre: o, axis: e, ring: 2.0, radius: 0.5 };
+        let inside = [
+            (Shape::Sphere { centre: o, radius: 0.7 }, o),
+            (Shape::Cylinder { point: o, axis: e, radius: 0.6 }, e),
+            (Shape::Cone(Cone::new(o, e * 2.0, [0.6, 0.3]).unwrap()), e),
+            (torus(), Vec3([2.0, 0.0, 0.0])),
+            (Shape::Tube(Tube::straight(&line, &radii, TubeEnds::Open).unwrap()), e * 1.3),
+            (Shape::Tube(Tube::smooth(&line, &radii, TubeEnds::Open).unwrap()), e * 1.3),
+        ];
+        let inside = inside.map(|(shape, at)| (Surface { shape, side: Side::Inside }, at));
+        let ring = Surface { shape: torus(), side: Side::Outside };
+        inside.into_iter().chain([(ring.clone(), o), (ring, e)]).collect()
+    }
+
+    /// In the middle of holes the distance has two continuous derivatives, and the normal no direction across the axis.
+    #[test]
+    fn distances_are_rounded_off_in_the_middle_of_holes() {
+        let mut random = Random(31);
+        for (surface, middle) in holes() {
+            let at_middle = surface.distance(middle).unwrap();
+            let across = Vec3([at_middle.normal.0[0], at_middle.normal.0[1], 0.0]).norm();
+            assert!(across < 1e-12 && at_middle.normal.norm() < 0.5, "{surface:?} {at_middle:?}");
+            for _ in 0..200 {
+                let y = middle + random.vector(2e-4);
+                let (exact, here) = (surface.distance(variables::<3>(y, 0)).unwrap(), surface.distance(y).unwrap());
+                let size = here.curvature.max_abs();
+                assert!((Vec3(exact.value.partials) - here.normal).max_abs() < 1e-10, "{surface:?} {here:?}");
+                let error = (jacobian(exact.normal, 0) - here.curvature).max_abs();
+                assert!(error < 1e-9 * size, "{surface:?} {error:e} of {size:e}");
+            }
+            // Across the border of what is rounded off.
+            for border in [0.2, 0.3, 0.5, 0.6, 0.7, 1.5].map(|radius| 1e-4 * radius) {
+                let at = |x: f64| surface.distance(middle + Vec3([border * x, 0.0, 0.0])).unwrap();
+                let (before, after) = (at(1.0 - 1e-6), at(1.0 + 1e-6));
+                assert!((before.value - after.value).abs() < 1e-9 && (before.normal - after.normal).max_abs() < 1e-4);
+            }
         }
     }
 

@@ -14,7 +14,7 @@
 //! over), so that the distance is a function of the point alone.
 
 use super::cone::Cone;
-use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, Undefined, sphere};
+use super::distance::{Distance, Feature, MIN_RELATIVE_DISTANCE, RoundedLength, Rounding, Undefined, sphere};
 use super::minimum::{Slopes, interior_minima};
 use crate::kernel::spline::cubics;
 use crate::scalar::Real;
@@ -126,10 +126,15 @@ impl Piece {
         Section { place: values.map(|[x, y, z, _]| Vec3([x, y, z])), radius: values.map(|[_, _, _, radius]| radius) }
     }
 
-    /// F_u and F_uu; `None` on the centre line.
-    fn slopes<T: Real>(&self, y: Vec3<T>, u: T) -> Option<[T; 2]> {
+    /// F_u and F_uu; `None` on the centre line, unless the distance from it is rounded off.
+    fn slopes<T: Real>(&self, y: Vec3<T>, u: T, blunt: f64) -> Option<[T; 2]> {
         let Section { place: [c, c1, c2], radius: [radius, r1, r2] } = self.at(u);
         let d = y - c;
+        if let Some(rounded) = RoundedLength::of(d, blunt) {
+            let along = d.dot(c1);
+            let second = (c1.squared() - d.dot(c2)) * rounded.slope + along * along * rounded.bend - r2;
+            return Some([-along * rounded.slope - r1, second]);
+        }
         let l = d.norm();
         if l.largest() <= MIN_RELATIVE_DISTANCE * radius.largest() {
             return None;
@@ -142,9 +147,10 @@ impl Piece {
     }
 
     /// F, a distance from the tube if u is that of the closest point.
-    fn value(&self, y: Vec3, u: f64) -> f64 {
+    fn value(&self, y: Vec3, u: f64, blunt: f64) -> f64 {
         let section = self.at(u);
-        (y - section.place[0]).norm() - section.radius[0]
+        let d = y - section.place[0];
+        RoundedLength::of(d, blunt).map_or_else(|| d.norm(), |rounded| rounded.value) - section.radius[0]
     }
 
     fn lower_bound(&self, y: Vec3) -> f64 {
@@ -152,16 +158,16 @@ impl Piece {
     }
 
     /// The closest of the ends and the local minima of a piece.
-    fn closest(&self, y: Vec3) -> Closest {
-        let mut best = Closest { u: 0.0, value: self.value(y, 0.0) };
+    fn closest(&self, y: Vec3, blunt: f64) -> Closest {
+        let mut best = Closest { u: 0.0, value: self.value(y, 0.0, blunt) };
         let mut offer = |u: f64| {
-            let value = self.value(y, u);
+            let value = self.value(y, u, blunt);
             if value < best.value {
                 best = Closest { u, value };
             }
         };
         offer(1.0);
-        let slopes = |u: f64| self.slopes(y, u).map(|[first, second]| Slopes { first, second });
+        let slopes = |u: f64| self.slopes(y, u, blunt).map(|[first, second]| Slopes { first, second });
         // A point of the centre line has no slope there, and may lie where two intervals meet.
         (1..INTERVALS).map(|k| k as f64 / INTERVALS as f64).filter(|&u| slopes(u).is_none()).for_each(&mut offer);
         interior_minima(INTERVALS, &slopes, &mut offer);
@@ -274,27 +280,34 @@ impl Tube {
     }
 
     /// The distance from the tube, outside of it.
-    pub(super) fn distance<T: Real>(&self, y: Vec3<T>) -> Result<Distance<T>, Undefined> {
+    pub(super) fn distance<T: Real>(&self, y: Vec3<T>, rounding: Rounding) -> Result<Distance<T>, Undefined> {
         let here = Vec3(y.0.map(T::largest));
+        let blunt = rounding.inside * self.least_radius;
         match &self.line {
-            CentreLine::Straight(cones) => self.distance_from_cones(cones, y, here),
-            CentreLine::Smooth(pieces) => self.distance_from_spline(pieces, y, here),
+            CentreLine::Straight(cones) => self.distance_from_cones(cones, y, here, blunt),
+            CentreLine::Smooth(pieces) => self.distance_from_spline(pieces, y, here, blunt),
         }
     }
 
-    fn distance_from_cones<T: Real>(&self, cones: &[Cone], y: Vec3<T>, here: Vec3) -> Result<Distance<T>, Undefined> {
+    fn distance_from_cones<T: Real>(
+        &self,
+        cones: &[Cone],
+        y: Vec3<T>,
+        here: Vec3,
+        blunt: f64,
+    ) -> Result<Distance<T>, Undefined> {
         let mut best: Option<(usize, f64)> = None;
         for (k, cone) in cones.iter().enumerate() {
             if best.is_some_and(|(_, value)| cone.lower_bound(here) >= value) {
                 continue;
             }
-            let value = cone.distance(here)?.value;
+            let value = cone.distance(here, blunt)?.value;
             if best.is_none_or(|(_, least)| value < least) {
                 best = Some((k, value));
             }
         }
         let Some((k, _)) = best else { return Err(Undefined::BeyondEnd) };
-        let distance = cones[k].distance(y)?;
+        let distance = cones[k].distance(y, blunt)?;
         let beyond = distance.feature == Feature::End
             && ((k == 0 && cones[k].is_before(here)) || (k + 1 == cones.len() && cones[k].is_after(here)));
         match self.ends {
@@ -308,13 +321,14 @@ impl Tube {
         pieces: &[Piece],
         y: Vec3<T>,
         here: Vec3,
+        blunt: f64,
     ) -> Result<Distance<T>, Undefined> {
         let mut best: Option<(usize, Closest)> = None;
         for (k, piece) in pieces.iter().enumerate() {
             if best.is_some_and(|(_, closest)| piece.lower_bound(here) >= closest.value) {
                 continue;
             }
-            let closest = piece.closest(here);
+            let closest = piece.closest(here, blunt);
             if best.is_none_or(|(_, least)| closest.value < least.value) {
                 best = Some((k, closest));
             }
@@ -322,14 +336,14 @@ impl Tube {
         let Some((k, Closest { u, .. })) = best else { return Err(Undefined::BeyondEnd) };
         let piece = &pieces[k];
         let at_end = (k == 0 && u == 0.0) || (k + 1 == pieces.len() && u == 1.0);
-        let Some([first, second]) = piece.slopes(y, T::constant(u)) else { return Err(Undefined::Axis) };
+        let Some([first, second]) = piece.slopes(y, T::constant(u), blunt) else { return Err(Undefined::Axis) };
         let outward = if u == 0.0 { first.largest() } else { -first.largest() };
         if at_end && outward > 0.0 {
             return match self.ends {
                 TubeEnds::Open => Err(Undefined::BeyondEnd),
                 TubeEnds::Round => {
                     let Section { place: [c, ..], radius: [radius, ..] } = piece.at(u);
-                    sphere(y - Vec3::constant(c), radius)
+                    sphere(y - Vec3::constant(c), radius, blunt)
                 }
             };
         }
@@ -337,7 +351,7 @@ impl Tube {
             return Err(Undefined::NotUnique);
         }
         // A step of Newton's method in the scalar of the point: its derivatives follow.
-        piece.distance(y, T::constant(u) - first / second)
+        piece.distance(y, T::constant(u) - first / second, blunt)
     }
 }
 
@@ -387,10 +401,20 @@ impl Piece {
     }
 
     /// The distance from the tube at the closest point `u`.
-    fn distance<T: Real>(&self, y: Vec3<T>, u: T) -> Result<Distance<T>, Undefined> {
+    fn distance<T: Real>(&self, y: Vec3<T>, u: T, blunt: f64) -> Result<Distance<T>, Undefined> {
         let Section { place: [c, c1, _], radius: [radius, ..] } = self.at(u);
-        let Some([_, second]) = self.slopes(y, u) else { return Err(Undefined::Axis) };
+        let Some([_, second]) = self.slopes(y, u, blunt) else { return Err(Undefined::Axis) };
         let d = y - c;
+        if let Some(rounded) = RoundedLength::of(d, blunt) {
+            let hessian = rounded.hessian(d, Mat3::identity());
+            let a = hessian * c1;
+            return Ok(Distance {
+                value: rounded.value - radius,
+                normal: d * rounded.slope,
+                curvature: hessian - a.outer(a) * (T::one() / second),
+                feature: Feature::Face,
+            });
+        }
         let l = d.norm();
         let inverse = T::one() / l;
         let n = d * inverse;
