@@ -3,19 +3,31 @@
 use super::mesh::{Mesh, MeshBeam};
 use beamsim_core::effect::Effect;
 use beamsim_core::effect::elasticity::StressField;
-use beamsim_core::probe::{BeamElements, BeamPoint};
+use beamsim_core::probe::{BeamElements, BeamPoint, BeamSide};
 use beamsim_core::section::{Matrix6, Vector6};
-use beamsim_core::system::Slot;
+use beamsim_core::system::{Node, Slot};
+use beamsim_core::tensor::Mat3;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, OnceLock};
 
-/// Nodes within beams at which no concentrated force acts: forces jump there only by what acts along the beam (loads,
-/// gravity, inertia). What acts on rotations alone does not matter.
-pub struct PlainNodes {
+/// Section axes that differ by less are those of a line without a corner.
+const STRAIGHT: f64 = 1e-6;
+
+/// What acts at the nodes between elements of beams.
+pub struct ActionsAtNodes {
     /// Slots at which something acts; joints and sliders are not among them, but found in the effects
     acting: Vec<Slot>,
     /// For each beam, looked for when they are asked for first
-    found: OnceLock<Vec<Arc<[bool]>>>,
+    found: OnceLock<Vec<NodesBetween>>,
+}
+
+/// The nodes between elements of a beam.
+struct NodesBetween {
+    /// True where no concentrated force acts: forces jump there only by what acts along the beam (loads, gravity,
+    /// inertia). What acts on rotations alone does not matter.
+    plain: Arc<[bool]>,
+    /// True where no concentrated moment acts either
+    smooth: Vec<bool>,
 }
 
 /// Maker of points of the beams of a scene.
@@ -27,35 +39,46 @@ pub struct BeamPoints<'a> {
     pub(super) elasticity: &'a [Arc<dyn StressField>],
     /// All effects of the scene
     pub(super) effects: &'a [Arc<dyn Effect>],
-    /// See [`PlainNodes`]
-    pub(super) plain: &'a PlainNodes,
+    /// See [`ActionsAtNodes`]
+    pub(super) actions: &'a ActionsAtNodes,
 }
 
-impl PlainNodes {
+impl ActionsAtNodes {
     /// Nodes of a scene in which supports, motions, loads, bodies, springs and contacts act at the slots `acting`.
     pub fn new(acting: Vec<Slot>) -> Self {
         Self { acting, found: OnceLock::new() }
     }
 
-    /// For each beam each node between two elements, where elements have two nodes.
-    fn of_beams(&self, mesh: &Mesh, effects: &[Arc<dyn Effect>]) -> &[Arc<[bool]>] {
+    /// Those of each beam.
+    fn of_beams(&self, mesh: &Mesh, effects: &[Arc<dyn Effect>]) -> &[NodesBetween] {
         self.found.get_or_init(|| {
-            let slots = |beam: &MeshBeam| beam.nodes.iter().map(|&node| mesh.nodes[node].node.u).collect();
-            let beams: Vec<Vec<Slot>> = mesh.beams.iter().map(slots).collect();
-            let elements: Vec<[Slot; 2]> =
-                beams.iter().flat_map(|beam| beam.windows(2).map(|w| [w[0], w[1]])).collect();
+            let node = |number: &usize| mesh.nodes[*number].node;
+            let of_beam = |beam: &MeshBeam| -> Vec<Vec<Slot>> {
+                let nodes = |k: usize| &beam.nodes[k * beam.order..=(k + 1) * beam.order];
+                (0..beam.elements.len()).map(|k| nodes(k).iter().map(|number| node(number).u).collect()).collect()
+            };
+            let elements: HashSet<Vec<Slot>> = mesh.beams.iter().flat_map(of_beam).collect();
             let mut ends: HashMap<Slot, usize> = HashMap::new();
-            elements.iter().flatten().for_each(|&end| *ends.entry(end).or_default() += 1);
-            let mut loaded_or_coupled: HashSet<Slot> = self.acting.iter().copied().collect();
-            loaded_or_coupled.extend(coupled(mesh, effects, &elements.into_iter().collect()));
-            let is_plain = |slot: &Slot| ends[slot] == 2 && !loaded_or_coupled.contains(slot);
-            beams.iter().map(|beam| beam[1..beam.len() - 1].iter().map(is_plain).collect()).collect()
+            let both_ends = elements.iter().flat_map(|nodes| [nodes[0], nodes[nodes.len() - 1]]);
+            both_ends.for_each(|end| *ends.entry(end).or_default() += 1);
+            let mut acts_at: HashSet<Slot> = self.acting.iter().copied().collect();
+            acts_at.extend(coupled(mesh, effects, &elements));
+            let is_plain = |at: &Node| ends[&at.u] == 2 && !acts_at.contains(&at.u);
+            let nodes_between = |beam: &MeshBeam| {
+                let inner = &beam.nodes[1..beam.nodes.len() - 1];
+                let nodes: Vec<Node> = inner.iter().skip(beam.order - 1).step_by(beam.order).map(node).collect();
+                NodesBetween {
+                    plain: nodes.iter().map(is_plain).collect(),
+                    smooth: nodes.iter().map(|at| is_plain(at) && !acts_at.contains(&at.p)).collect(),
+                }
+            };
+            mesh.beams.iter().map(nodes_between).collect()
         })
     }
 }
 
-/// The displacement slots of nodes that effects couple to others or to multipliers, except neighbours on a beam.
-fn coupled(mesh: &Mesh, effects: &[Arc<dyn Effect>], elements: &HashSet<[Slot; 2]>) -> HashSet<Slot> {
+/// The displacement slots of nodes that effects couple to others or to multipliers, except within an element.
+fn coupled(mesh: &Mesh, effects: &[Arc<dyn Effect>], elements: &HashSet<Vec<Slot>>) -> HashSet<Slot> {
     let slots = mesh.nodes.iter().flat_map(|at| [(at.node.u, at.node.u), (at.node.p, at.node.u)]);
     let node_at: HashMap<Slot, Slot> = slots.collect();
     let mut found = HashSet::new();
@@ -64,8 +87,9 @@ fn coupled(mesh: &Mesh, effects: &[Arc<dyn Effect>], elements: &HashSet<[Slot; 2
             let mut nodes: Vec<Option<Slot>> = instance.iter().map(|slot| node_at.get(slot).copied()).collect();
             nodes.dedup();
             let acts_at_one = nodes.len() == 1;
-            let is_element = matches!(nodes[..], [Some(start), Some(end)] if elements.contains(&[start, end]));
-            if !acts_at_one && !is_element {
+            let all_of_nodes = || nodes.iter().copied().collect::<Option<Vec<Slot>>>();
+            let is_element = || all_of_nodes().is_some_and(|slots| elements.contains(&slots));
+            if !acts_at_one && !is_element() {
                 found.extend(nodes.into_iter().flatten());
             }
         }
@@ -74,21 +98,22 @@ fn coupled(mesh: &Mesh, effects: &[Arc<dyn Effect>], elements: &HashSet<[Slot; 2
 }
 
 impl BeamPoints<'_> {
-    /// The point of a beam at a fraction of its length, which lies in elements at some xi: two at a node between elements.
-    pub fn point(&self, number: usize, fraction: f64, sides: Vec<(u32, f64)>) -> BeamPoint {
+    /// The point of a beam at a fraction of its length, which lies in an element at some xi, and, where it is a node
+    /// between elements, in the next one, too.
+    pub fn point(&self, number: usize, fraction: f64, place: (usize, f64), next: Option<(usize, f64)>) -> BeamPoint {
         let beam = &self.mesh.beams[number];
-        let plain = match beam.order {
-            1 => self.plain.of_beams(self.mesh, self.effects)[number].clone(),
-            _ => Arc::default(),
-        };
+        let between = &self.actions.of_beams(self.mesh, self.effects)[number];
+        let (frame, behind) = (beam.frame(fraction), beam.frame_behind(fraction));
+        let is_smooth = || between.smooth[place.0 - beam.elements.start] && (frame - behind).max_abs() < STRAIGHT;
+        let side = |(element, xi): (usize, f64), frame: Mat3| BeamSide { element: element as u32, xi, frame };
         let stiffness = beam.section.at(fraction).stiffness;
         BeamPoint {
             beam: number,
             fraction,
             elasticity: self.elasticity.to_vec(),
-            elements: BeamElements { first: beam.elements.start as u32, plain },
-            sides,
-            frame: beam.frame(fraction),
+            elements: BeamElements { first: beam.elements.start as u32, plain: between.plain.clone() },
+            sides: [side(place, frame)].into_iter().chain(next.map(|next| side(next, behind))).collect(),
+            jumps: next.is_some() && !is_smooth(),
             compliance: Matrix6::from_fn(|i, j| stiffness[i][j]).try_inverse(),
             free: beam.free_strain.as_ref().map_or(Vector6::zeros(), |free| Vector6::from(free.strain)),
         }

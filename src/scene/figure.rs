@@ -44,18 +44,16 @@ fn point(points: &BeamPoints, number: usize, k: usize, section: Option<PlacedRec
     let node = &mesh.nodes[beam.nodes[k]];
     let fraction = beam.fractions[k];
     let frame = beam.frame(fraction);
-    // Between two elements both have their say.
-    let side = |element: usize, at: usize| {
-        let number = beam.elements.start + element;
-        beam.elements.contains(&number).then_some((number as u32, 2.0 * at as f64 / beam.order as f64 - 1.0))
-    };
-    let element = k / beam.order;
-    let at = k % beam.order;
-    let before = (at == 0 && element > 0).then(|| side(element - 1, beam.order)).flatten();
-    let sides = before.into_iter().chain(side(element, at)).collect();
+    let (element, at) = (beam.elements.start + k / beam.order, k % beam.order);
+    let here = (element, 2.0 * at as f64 / beam.order as f64 - 1.0);
+    let here = beam.elements.contains(&element).then_some(here);
+    let before = (at == 0 && k > 0).then(|| (element - 1, 1.0));
     LinePoint {
         place: Place { nodes: vec![(node.node, node.place, 1.0)], frame, relative: false },
-        inside: points.point(number, fraction, sides),
+        inside: match (before, here) {
+            (Some(before), next) => points.point(number, fraction, before, next),
+            (None, _) => points.point(number, fraction, here.unwrap_or((beam.elements.start, -1.0)), None),
+        },
         section,
     }
 }

@@ -35,7 +35,7 @@ pub use stress::{coarse_stresses, recovery as section_stresses};
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, Severity, Spanned, StageBody, Target, Words, words,
 };
-use beam_points::{BeamPoints, PlainNodes};
+use beam_points::{ActionsAtNodes, BeamPoints};
 use beamsim_core::effect::contact::SurfaceContacts;
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::effect::inertia::Body;
@@ -84,8 +84,8 @@ pub struct Scene {
     pub(crate) resolved: serde_json::Value,
     /// Beam elasticity, the source of stress resultants
     elasticity: Vec<Arc<dyn StressField>>,
-    /// Nodes at which only elements act
-    plain: PlainNodes,
+    /// What acts at the nodes between elements
+    actions: ActionsAtNodes,
     /// Surfaces and contacts, for pictures
     contacts: Option<Arc<SurfaceContacts>>,
     /// The deck, if pictures show the stresses of its sections
@@ -102,7 +102,7 @@ impl Scene {
             mesh: &self.mesh,
             elasticity: &self.elasticity,
             effects: &self.plan.model.effects,
-            plain: &self.plain,
+            actions: &self.actions,
         };
         figure::figure(points, &self.bodies, &self.links, &sections.unwrap_or_default(), contacts)
     }
@@ -319,9 +319,13 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let stresses = SectionStresses::new(deck);
     let supported = supports.iter().flat_map(|support| &support.directions).map(|direction| direction.slot);
     let moved = motions.iter().map(|motion| motion.slot);
-    let plain = PlainNodes::new(supported.chain(moved).chain(composition.acting_at_nodes()).collect());
-    let points =
-        BeamPoints { mesh: &mesh, elasticity: &composition.elasticity, effects: &composition.effects, plain: &plain };
+    let actions = ActionsAtNodes::new(supported.chain(moved).chain(composition.acting_at_nodes()).collect());
+    let points = BeamPoints {
+        mesh: &mesh,
+        elasticity: &composition.elasticity,
+        effects: &composition.effects,
+        actions: &actions,
+    };
     let columns = Columns { deck, mesh: &mesh, points, stresses: &stresses };
     let probes = columns.written(&mut found);
     let envelope = deck.output.envelope.as_ref().map(|span| columns.stress_places(span, &mut found));
@@ -386,7 +390,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         links: composition.links,
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
-        plain,
+        actions,
         contacts: composition.contacts,
         stress_deck,
     })

@@ -238,10 +238,19 @@ impl MeshBeam {
         (self.elements.start + element, 2.0 * (fraction - start) / (end - start) - 1.0)
     }
 
-    /// The section axes of the exact curve at a fraction of the length.
+    /// The section axes of the exact curve at a fraction of the length; at a corner those of the piece before it.
     pub fn frame(&self, fraction: f64) -> Mat3 {
         let (piece, t) = self.line.locate(fraction);
         self.line.axes(piece, self.line.pieces[piece].tangent(t), fraction)
+    }
+
+    /// The same; at a corner those of the piece behind it.
+    pub fn frame_behind(&self, fraction: f64) -> Mat3 {
+        let (piece, t) = self.line.locate(fraction);
+        match self.line.pieces.get(piece + 1).filter(|_| t > 1.0 - 1e-9) {
+            Some(next) => self.line.axes(piece + 1, next.tangent(0.0), fraction),
+            None => self.frame(fraction),
+        }
     }
 }
 

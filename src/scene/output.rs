@@ -207,14 +207,15 @@ impl Columns<'_> {
     }
 
     /// Places along beams of which resultants are written, with the stresses of their sections where
-    /// they are known.
+    /// they are known: both sides of those where resultants jump.
     pub fn profile_places(&self, span: &Span) -> Vec<ProfilePlace> {
         let of_beam = |number: usize| {
-            let place = move |fraction: f64| {
+            let places = move |fraction: f64| {
                 let section = self.stresses.at(&self.mesh.beams[number].name, fraction, span).ok();
-                ProfilePlace { inside: self.inside(number, fraction), section }
+                let of_side = move |inside: BeamPoint| ProfilePlace { inside, section: section.clone() };
+                self.inside(number, fraction).by_jumps().into_iter().map(of_side)
             };
-            self.fractions(number).into_iter().map(place)
+            self.fractions(number).into_iter().flat_map(places)
         };
         (0..self.mesh.beams.len()).flat_map(of_beam).collect()
     }
@@ -271,11 +272,8 @@ impl Columns<'_> {
     fn inside(&self, number: usize, fraction: f64) -> BeamPoint {
         let beam = &self.mesh.beams[number];
         let (element, xi) = beam.element_at(fraction);
-        let mut sides = vec![(element as u32, xi)];
-        if xi > 1.0 - 1e-9 && element + 1 < beam.elements.end {
-            sides.push((element as u32 + 1, -1.0));
-        }
-        self.points.point(number, fraction, sides)
+        let is_between = xi > 1.0 - 1e-9 && element + 1 < beam.elements.end;
+        self.points.point(number, fraction, (element, xi), is_between.then_some((element + 1, -1.0)))
     }
 
     /// Probe and component of a column, by its name.

@@ -113,7 +113,7 @@ fn components((strain, stress): &(Strain, Stress)) -> [f64; 12] {
 
 /// The last node of an element is the first of the next one.
 fn elements(line: &Line) -> impl Iterator<Item = u32> {
-    let first = line.points[0].inside.sides[0].0;
+    let first = line.points[0].inside.sides[0].element;
     (0..(line.points.len() - 1) / line.order).map(move |k| first + k as u32)
 }
 
@@ -234,7 +234,7 @@ fn columns_are_resultants_of_the_linear_theory() {
             list(moment)
         );
         let simulation = simulate(&text);
-        let axes = scene_of(&text).figure().lines[0].points[0].inside.frame;
+        let axes = scene_of(&text).figure().lines[0].points[0].inside.sides[0].frame;
         let size = force.norm() * along.norm() + moment.norm();
         for (at, fraction) in [("b@start", 0.0), ("b@0.5", 0.5), ("b@end", 1.0)] {
             let read = |names: [&str; 3]| Vec3(names.map(|name| simulation.end(&format!("{at}.{name}"))));

@@ -4,6 +4,7 @@
 use super::folder::{Folder, status};
 use crate::random::Random;
 use crate::scenes::{Simulation, list, simulate};
+use beamsim_core::tensor::Vec3;
 use std::collections::HashMap;
 use std::fs;
 
@@ -239,6 +240,72 @@ fn envelopes_take_both_sides_of_a_node() {
     // M / W with W = b h^2 / 6
     let expected = 500.0 * 6.0 / 1e-3;
     assert!((largest / expected - 1.0).abs() < 0.01, "{largest} for {expected}");
+}
+
+/// Rows of a table with columns of text and numbers.
+fn table(folder: &Folder, file: &str) -> Vec<HashMap<String, String>> {
+    let text = fs::read_to_string(folder.0.join(file)).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_string).collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    lines.map(|line| names.iter().cloned().zip(line).collect()).collect()
+}
+
+/// A frame of two legs, as one beam with a corner and as two beams that meet there: each leg has the same resultants and
+/// stresses, also at the corner, in its own axes. A couple beside it makes the moment jump: both sides have a row.
+#[test]
+fn both_sides_of_a_corner_and_of_a_couple_are_written() {
+    let mut random = Random::new(98);
+    for order in 1..=3 {
+        let [along, aside] = random.axes();
+        let places = [Vec3::ZERO, along * 0.4, along * 0.4 + aside * 0.5, along * 0.4 + aside];
+        let points: String =
+            ["a", "k", "c", "b"].iter().zip(places).map(|(name, at)| format!("{name} = {}\n", list(at))).collect();
+        let beam = |name: &str, through: &str| {
+            let elements = "2, ".repeat(through.matches(',').count());
+            format!(
+                "[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = {through}\nelements = [{elements}]\norder = {order}\n\
+                 axis3 = {}\n",
+                list(along.cross(aside))
+            )
+        };
+        let rest = format!(
+            "[[support]]\nat = \"a\"\nfix = \"all\"\n[[load]]\nat = \"b\"\nforce = {}\n[[load]]\nat = \"c\"\nmoment = {}\n\
+             [output]\nnodes = [\"b\"]\nenvelope = true\nprofile = true\n[[stage]]\nkind = \"static\"\nsteps = 1\n",
+            list(random.vector(10.0)),
+            list(random.vector(8.0))
+        );
+        let head = format!(
+            "[point]\n{points}[material.steel]\nE = 2e11\nnu = 0.3\n\
+             [section.s]\nmaterial = \"steel\"\nshape = \"rectangle\"\nwidth = 0.02\nheight = 0.03\n"
+        );
+        let folder = Folder::new(&format!("both_sides_{order}"));
+        folder.write("one.toml", &format!("{head}{}{rest}", beam("leg", "[\"a\", \"k\", \"c\", \"b\"]")));
+        let two = [beam("first", "[\"a\", \"k\"]"), beam("second", "[\"k\", \"c\", \"b\"]")].concat();
+        folder.write("two.toml", &format!("{head}{two}{rest}"));
+        for name in ["one", "two"] {
+            let run = folder.beamsim(&["run", &format!("{name}.toml"), "--out", name]);
+            assert_eq!(status(&run), 0, "{}", String::from_utf8_lossy(&run.stderr));
+        }
+        let [one, two] = ["one", "two"].map(|name| table(&folder, &format!("{name}/profile.csv")));
+        assert_eq!(one.len(), two.len());
+        let columns = ["N1", "N2", "N3", "M1", "M2", "M3", "vm"];
+        for (a, b) in one.iter().zip(&two) {
+            let [a, b] = [a, b].map(|row| columns.map(|name| row[name].parse::<f64>().unwrap()));
+            for k in 0..7 {
+                let size = if k < 6 { 10.0 } else { 1e6 };
+                assert!((a[k] - b[k]).abs() < 1e-6 * size, "order {order}, {}: {a:?} {b:?}", columns[k]);
+            }
+        }
+        // The couple.
+        let at = |row: &HashMap<String, String>| (row["length"].parse::<f64>().unwrap() - 0.9).abs() < 1e-9;
+        assert_eq!(one.iter().filter(|row| at(row)).count(), 2, "order {order}");
+        let largest = |name: &str| {
+            let values = table(&folder, &format!("{name}/stress.csv")).into_iter();
+            values.map(|row| row["vm"].parse::<f64>().unwrap()).fold(0.0, f64::max)
+        };
+        let [one, two] = [largest("one"), largest("two")];
+        assert!((one / two - 1.0).abs() < 1e-6, "order {order}: {one} {two}");
+    }
 }
 
 /// Error bars hold the errors of resultants, and are not many times as long.

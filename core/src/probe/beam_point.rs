@@ -19,14 +19,25 @@ pub struct BeamPoint {
     pub elasticity: Vec<Arc<dyn StressField>>,
     /// The elements of the beam
     pub elements: BeamElements,
-    /// For each side the number of the element in the scene, and xi in it
-    pub sides: Vec<(u32, f64)>,
-    /// Initial section axes as columns
-    pub frame: Mat3,
+    /// Where it lies in elements: two at a node between them, the one before it first
+    pub sides: Vec<BeamSide>,
+    /// True if resultants may jump there: where something acts, and at a corner
+    pub jumps: bool,
     /// Strains over resultants, section axes; `None` for a section without stiffness against some strain
     pub compliance: Option<Matrix6>,
     /// Gamma and K of the free strain, section axes, where its amplitude is one
     pub free: Vector6,
+}
+
+/// A side of a point of a beam.
+#[derive(Clone, Copy)]
+pub struct BeamSide {
+    /// Number of the element in the scene
+    pub element: u32,
+    /// The place in it, from -1 to 1
+    pub xi: f64,
+    /// Initial section axes as columns; those of both sides differ at a corner
+    pub frame: Mat3,
 }
 
 /// The elements of a beam.
@@ -109,30 +120,49 @@ impl BeamPoint {
         Vector6::from(self.strain_and_stress(&mut ElementCache::new(state, origin))[1])
     }
 
-    /// Gamma and K, then N and M, in section axes; mean of both sides.
+    /// Gamma and K, then N and M, in the section axes of the first side; mean of both sides.
     pub fn strain_and_stress(&self, cache: &mut ElementCache) -> [[f64; 6]; 2] {
-        let sides = self.at_sides(cache);
+        let frame = self.sides[0].frame;
+        let sides: Vec<_> = self.sides.iter().filter_map(|side| self.at(&BeamSide { frame, ..*side }, cache)).collect();
         let mean = |part: usize, k: usize| sides.iter().map(|side| side[part][k]).sum::<f64>() / sides.len() as f64;
         [0, 1].map(|part| std::array::from_fn(|k| mean(part, k)))
     }
 
-    /// Gamma and K, then N and M, in section axes, on each side: see [`ElementStresses`]. Strains belong to the
-    /// resultants and to the section at the point.
+    /// Gamma and K, then N and M, in section axes, on each side.
     pub fn at_sides(&self, cache: &mut ElementCache) -> Vec<[[f64; 6]; 2]> {
-        let local = |v: Vec3| self.frame.transpose_mul(v).0;
-        let mut of_side = |&(element, xi): &(u32, f64)| {
-            let stresses = cache.element(element, &self.elasticity)?;
-            let along = if stresses.hides_force_along() { self.force_along(element, cache) } else { Vec3::ZERO };
-            let (strain, stress) = stresses.at(xi, along);
-            let six = |a: Vec3, b: Vec3| Vector6::from_iterator([local(a), local(b)].into_iter().flatten());
-            let resultant = six(stress.n, stress.m);
-            let strain = match &self.compliance {
-                Some(compliance) => compliance * resultant + self.free * stresses.free_amplitude,
-                None => six(strain.gamma, strain.kappa),
-            };
-            Some([strain.into(), resultant.into()])
+        self.sides.iter().filter_map(|side| self.at(side, cache)).collect()
+    }
+
+    /// The resultants between which they jump: those of both sides, or else the mean.
+    pub fn resultants(&self, cache: &mut ElementCache) -> Vec<[f64; 6]> {
+        match self.jumps {
+            true => self.at_sides(cache).into_iter().map(|[_, resultant]| resultant).collect(),
+            false => vec![self.strain_and_stress(cache)[1]],
+        }
+    }
+
+    /// The point seen from each of its sides alone, where resultants jump; otherwise the point.
+    pub fn by_jumps(self) -> Vec<Self> {
+        if !self.jumps {
+            return vec![self];
+        }
+        self.sides.iter().map(|side| Self { sides: vec![*side], ..self.clone() }).collect()
+    }
+
+    /// Gamma and K, then N and M, in section axes, on a side: see [`ElementStresses`]. Strains belong to the
+    /// resultants and to the section at the point.
+    fn at(&self, side: &BeamSide, cache: &mut ElementCache) -> Option<[[f64; 6]; 2]> {
+        let local = |v: Vec3| side.frame.transpose_mul(v).0;
+        let stresses = cache.element(side.element, &self.elasticity)?;
+        let along = if stresses.hides_force_along() { self.force_along(side.element, cache) } else { Vec3::ZERO };
+        let (strain, stress) = stresses.at(side.xi, along);
+        let six = |a: Vec3, b: Vec3| Vector6::from_iterator([local(a), local(b)].into_iter().flatten());
+        let resultant = six(stress.n, stress.m);
+        let strain = match &self.compliance {
+            Some(compliance) => compliance * resultant + self.free * stresses.free_amplitude,
+            None => six(strain.gamma, strain.kappa),
         };
-        self.sides.iter().filter_map(&mut of_side).collect()
+        Some([strain.into(), resultant.into()])
     }
 
     /// The force per length on an element (material, global components), from the jumps of the force

@@ -61,8 +61,10 @@ pub struct Look {
     pub velocity: Vec3,
     /// Gamma and K, section axes
     pub strain: [f64; 6],
-    /// N and M, section axes
+    /// N and M, section axes: mean of both sides
     pub resultant: [f64; 6],
+    /// The same on both sides, where it jumps
+    pub jump: Option<[[f64; 6]; 2]>,
     /// Strain energy per length
     pub energy: f64,
 }
@@ -83,8 +85,11 @@ impl Figure {
         let points = || self.lines.iter().flat_map(|line| &line.points);
         points().find(|point| point.section.is_some())?;
         let of_section = |section: &PlacedRecovery, look: &Look| {
-            let load = Vector6::from(look.resultant);
-            Some(section.largest(Measure::VonMises, &load, f64::NEG_INFINITY)?.value)
+            let of_load = |load: &[f64; 6]| {
+                Some(section.largest(Measure::VonMises, &Vector6::from(*load), f64::NEG_INFINITY)?.value)
+            };
+            let loads = look.jump.as_ref().map_or(std::slice::from_ref(&look.resultant), |sides| sides);
+            loads.iter().filter_map(of_load).reduce(f64::max)
         };
         let of_point = |(point, look): (&LinePoint, &Look)| {
             point.section.as_ref().and_then(|section| of_section(section, look)).unwrap_or(f64::NAN)
@@ -128,7 +133,8 @@ impl LinePoint {
         // Energy of the strains that have stress: free strains have none.
         let stress = Vector6::from(resultant);
         let energy = self.inside.compliance.map_or(0.0, |compliance| 0.5 * stress.dot(&(compliance * stress)));
-        Look { strain, resultant, energy, ..bare(&self.place, cache.state) }
+        let jump = self.inside.resultants(cache).try_into().ok();
+        Look { strain, resultant, jump, energy, ..bare(&self.place, cache.state) }
     }
 }
 
@@ -143,6 +149,7 @@ fn bare(place: &Place, state: &State) -> Look {
         velocity: motion.u_rate,
         strain: [0.0; 6],
         resultant: [0.0; 6],
+        jump: None,
         energy: 0.0,
     }
 }

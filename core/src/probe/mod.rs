@@ -11,7 +11,7 @@ mod profile;
 mod quantity;
 mod reading;
 
-pub use beam_point::{BeamElements, BeamPoint, StressPlace, StressPoint};
+pub use beam_point::{BeamElements, BeamPoint, BeamSide, StressPlace, StressPoint};
 pub use columns::{
     COLUMNS, ColumnGroup, ColumnPart, ENERGY_WITH_CONTACTS, Nearest, Need, STRESS_AT_POINT, STRESS_WITH_INDEX, Source,
     clocks, find_column, find_part, group, quantity,

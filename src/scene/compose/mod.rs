@@ -75,6 +75,8 @@ pub struct Composition {
     pub(super) springs: Vec<GroundSpring>,
     /// Nodes with a force of a [[load]]
     pub(super) loaded: Vec<Node>,
+    /// Nodes with a moment of a [[load]]
+    pub(super) turned: Vec<Node>,
     /// Slots of multipliers, behind those of the mesh: what they hold, and the joint
     pub(super) multipliers: Vec<(SlotKind, String)>,
     /// Components of these that nothing uses
@@ -90,13 +92,14 @@ pub struct Composition {
 }
 
 impl Composition {
-    /// Slots of displacements at which loads, bodies, springs and contacts act.
+    /// Slots of displacements at which loads, bodies, springs and contacts act, and of rotations at which loads do.
     pub fn acting_at_nodes(&self) -> impl Iterator<Item = Slot> {
         let bodies = self.bodies.iter().map(|body| body.node);
         let springs = self.springs.iter().map(|spring| spring.node);
         let links = self.links.iter().flat_map(|link| link.nodes);
         let touching = self.contacts.iter().flat_map(|contacts| contacts.nodes_of_beams());
-        self.loaded.iter().copied().chain(bodies).chain(springs).chain(links).chain(touching).map(|node| node.u)
+        let forces = self.loaded.iter().copied().chain(bodies).chain(springs).chain(links).chain(touching);
+        forces.map(|node| node.u).chain(self.turned.iter().map(|node| node.p))
     }
 
     /// Lengths of bodies: radii of gyration and of contact.
@@ -148,6 +151,7 @@ pub fn compose(
         links: Vec::new(),
         springs: Vec::new(),
         loaded: Vec::new(),
+        turned: Vec::new(),
         multipliers: Vec::new(),
         idle_multipliers: Vec::new(),
         slider_motions: Vec::new(),
