@@ -137,7 +137,7 @@ impl Triangles {
 
     fn of_obj(content: &[u8]) -> Result<Self, String> {
         let text = std::str::from_utf8(content).map_err(|error| format!("not a text: {error}"))?;
-        let shapes: String = text.lines().filter_map(line_of_shape).collect();
+        let shapes = shapes_of_obj(text)?;
         let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
         let no_materials = |_: &std::path::Path| Err(LoadError::GenericFailure);
         let read = tobj::load_obj_buf(&mut shapes.as_bytes(), &options, no_materials);
@@ -212,25 +212,56 @@ fn all_solids(text: &str) -> Result<Vec<u8>, String> {
     Ok(format!("solid mesh\n{facets}endsolid mesh\n").into_bytes())
 }
 
-/// A line with a vertex or a face, the corners of which are reduced to their vertices: nothing else of
-/// an OBJ file belongs to the shape.
-fn line_of_shape(line: &str) -> Option<String> {
-    let mut words = line.split_whitespace();
-    match words.next()? {
-        "v" => Some(format!("v {}\n", words.take(3).collect::<Vec<_>>().join(" "))),
-        "f" => {
-            let vertex = |corner: &str| corner.split('/').next().unwrap_or_default().to_string();
-            Some(format!("f {}\n", words.map(vertex).collect::<Vec<_>>().join(" ")))
+/// The lines with vertices and faces, the corners of which are reduced to their vertices: nothing else of an OBJ file
+/// belongs to the shape. A line that ends with `\` goes on in the next one.
+fn shapes_of_obj(text: &str) -> Result<String, String> {
+    let mut shapes = String::new();
+    let mut vertices = 0;
+    let mut lines = text.lines().zip(1..);
+    while let Some((line, number)) = lines.next() {
+        let mut whole = line.to_string();
+        while whole.ends_with('\\') {
+            whole.pop();
+            whole.push(' ');
+            whole.push_str(lines.next().map_or("", |(line, _)| line));
         }
-        _ => None,
+        let wrong = |message: String| format!("line {number}: {message}");
+        let mut words = whole.split_whitespace();
+        let (kind, parts) = match words.next() {
+            Some("v") => ("v", words.take(3).map(coordinate).collect::<Result<Vec<_>, _>>()),
+            Some("f") => ("f", words.map(|corner| vertex_of(corner, vertices)).collect()),
+            Some(_) | None => continue,
+        };
+        let parts = parts.map_err(wrong)?;
+        if parts.len() < 3 {
+            return Err(wrong("a vertex has three coordinates, and a face three corners or more".into()));
+        }
+        vertices += i64::from(kind == "v");
+        shapes += &format!("{kind} {}\n", parts.join(" "));
     }
+    Ok(shapes)
+}
+
+/// A coordinate of a vertex.
+fn coordinate(word: &str) -> Result<&str, String> {
+    word.parse::<f64>().map(|_| word).map_err(|_| format!("`{word}` is not a number"))
+}
+
+/// The vertex of a corner of a face: `5`, `5/2`, `5//3` or, counted back, `-1`, of those so far.
+fn vertex_of(corner: &str, vertices: i64) -> Result<&str, String> {
+    let word = corner.split('/').next().unwrap_or_default();
+    let number = word.parse::<i64>().map_err(|_| format!("`{corner}` is not a corner of a face"))?;
+    if number == 0 || -number > vertices {
+        return Err(format!("there is no vertex {number}"));
+    }
+    Ok(word)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const TETRAHEDRON: &str = "# a comment\no part\nv 0 0 0\nv 1 0 0 1.0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nusemtl red\n\
+    const TETRAHEDRON: &str = "# a comment\no part\nv 0 \\\n0 0\nv 1 0 0 1.0\nv 0 1 \\\r\n 0\nv 0 0 1\nvn 0 0 1\nusemtl red\n\
                                f 1//1 3//1 2//1\nf -4 -3 -1\nf 2/7 3/7 4\nf 3 1 4\n";
 
     fn triangle(corners: [[f32; 3]; 3]) -> Vec<u8> {

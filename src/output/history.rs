@@ -429,10 +429,12 @@ impl HistoryReader {
         let mut rows = Vec::new();
         for (number, record) in reader.records().enumerate() {
             let record = record.map_err(|e| wrong(e.to_string()))?;
-            let parse = |field: &str| {
-                field.trim().parse::<f64>().map_err(|_| wrong(format!("row {}: `{field}` is not a number", number + 1)))
+            let parse = |(field, name): (&str, &String)| {
+                let not_a_number =
+                    || format!("row {}: `{field}` in column `{name}` is not a number: not a history", number + 1);
+                field.trim().parse::<f64>().map_err(|_| wrong(not_a_number()))
             };
-            rows.push(record.iter().map(parse).collect::<Result<_, _>>()?);
+            rows.push(record.iter().zip(&names).map(parse).collect::<Result<_, _>>()?);
         }
         Ok(Self { names, rows })
     }

@@ -400,7 +400,15 @@ fn meshes_that_bound_no_body_are_refused_with_their_place() {
         let found = built(&file);
         assert!(found.contains(told), "{found}");
     }
-    assert!(with_file(&deck, "v 0 0 zero\nf 1 1 1\n").unwrap_err().contains("part.obj"));
+    let told = [
+        ("v 0 0 zero\nf 1 1 1\n", "part.obj: line 1: `zero` is not a number"),
+        ("v 0 \\\n0\n", "line 1: a vertex has three"),
+        ("v 0 0 0\n\nf 1 1 -2\n", "line 3: there is no vertex -2"),
+    ];
+    for (file, told) in told {
+        let found = with_file(&deck, file).unwrap_err();
+        assert!(found.contains(told), "{found}");
+    }
     assert!(with_file(&deck.replace("part.obj", "part.ply"), BOX).unwrap_err().contains(".stl or .obj"));
     let unread = refusal(&deck);
     assert!(unread.contains("the mesh `part.obj` was not read"), "{unread}");

@@ -221,4 +221,11 @@ fn rotors_are_held_above_their_critical_speed() {
     assert_eq!(verdict(&rotor(64.0, 7.0)), StabilityVerdict::Stable);
     assert_eq!(verdict(&rotor(64.0, 9.0)), StabilityVerdict::Unstable);
     assert_eq!(verdict(&rotor(64.0, 15.0)), StabilityVerdict::Stable);
+    // The point at which the pivots change is told in words that agree.
+    for (soft, spin, told) in
+        [(100.0, 15.0, "2 negative pivots after it, against which"), (64.0, 9.0, "unstable after it, 1 ")]
+    {
+        let findings = simulate(&rotor(soft, spin)).counters.findings;
+        assert!(findings.events.iter().any(|event| event.to_string().contains(told)), "{:?}", findings.events);
+    }
 }

@@ -81,6 +81,8 @@ pub struct Event {
     pub kind: EventKind,
     /// How many pivots of the tangent are negative behind it, where that is known
     pub negative_pivots: Option<usize>,
+    /// False where their number does not tell whether the state is stable: in a rotating frame Coriolis forces may hold it
+    pub pivots_tell: bool,
 }
 
 /// Kinds of special points.
@@ -121,6 +123,9 @@ impl fmt::Display for Event {
         match self.negative_pivots {
             None => Ok(()),
             Some(0) => f.write_str(": stable after it"),
+            Some(n) if !self.pivots_tell => {
+                write!(f, ": {n} negative pivots after it, against which Coriolis forces may hold it")
+            }
             Some(1) => f.write_str(": unstable after it, 1 negative pivot"),
             Some(n) => write!(f, ": unstable after it, {n} negative pivots"),
         }

@@ -156,7 +156,8 @@ pub(super) fn tell_of_points(
     let after = after.and_then(Signature::negative);
     let kind = kind.or_else(|| changed.then_some(EventKind::Branch));
     let Some(kind) = kind else { return Ok(()) };
-    let event = Event { at: stage.moment(), kind, negative_pivots: after };
+    let tells = after.is_none_or(|count| pivots_tell(count, stage.stage().rotating));
+    let event = Event { at: stage.moment(), kind, negative_pivots: after, pivots_tell: tells };
     match stage.issued.points {
         0..MOST_TOLD => stage.warn(kind.warning(), event.to_string()),
         MOST_TOLD => {
