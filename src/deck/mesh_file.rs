@@ -220,7 +220,8 @@ fn shapes_of_obj(text: &str) -> Result<String, String> {
     let mut lines = text.lines().zip(1..);
     while let Some((line, number)) = lines.next() {
         let mut whole = line.to_string();
-        while whole.ends_with('\\') {
+        let is_shape = matches!(line.split_whitespace().next(), Some("v" | "f"));
+        while is_shape && whole.ends_with('\\') {
             whole.pop();
             whole.push(' ');
             whole.push_str(lines.next().map_or("", |(line, _)| line));
@@ -251,7 +252,7 @@ fn coordinate(word: &str) -> Result<&str, String> {
 fn vertex_of(corner: &str, vertices: i64) -> Result<&str, String> {
     let word = corner.split('/').next().unwrap_or_default();
     let number = word.parse::<i64>().map_err(|_| format!("`{corner}` is not a corner of a face"))?;
-    if number == 0 || -number > vertices {
+    if number == 0 || number < -vertices {
         return Err(format!("there is no vertex {number}"));
     }
     Ok(word)
@@ -261,7 +262,7 @@ fn vertex_of(corner: &str, vertices: i64) -> Result<&str, String> {
 mod tests {
     use super::*;
 
-    const TETRAHEDRON: &str = "# a comment\no part\nv 0 \\\n0 0\nv 1 0 0 1.0\nv 0 1 \\\r\n 0\nv 0 0 1\nvn 0 0 1\nusemtl red\n\
+    const TETRAHEDRON: &str = "# a comment of C:\\\no part\nv 0 \\\n0 0\nv 1 0 0 1.0\nv 0 1 \\\r\n 0\nv 0 0 1\nvn 0 0 1\nusemtl red\n\
                                f 1//1 3//1 2//1\nf -4 -3 -1\nf 2/7 3/7 4\nf 3 1 4\n";
 
     fn triangle(corners: [[f32; 3]; 3]) -> Vec<u8> {

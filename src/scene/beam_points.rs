@@ -49,7 +49,7 @@ impl ActionsAtNodes {
         Self { acting, found: OnceLock::new() }
     }
 
-    /// Those of each beam.
+    /// The nodes between the elements of each beam.
     fn of_beams(&self, mesh: &Mesh, effects: &[Arc<dyn Effect>]) -> &[NodesBetween] {
         self.found.get_or_init(|| {
             let node = |number: &usize| mesh.nodes[*number].node;
@@ -57,12 +57,12 @@ impl ActionsAtNodes {
                 let nodes = |k: usize| &beam.nodes[k * beam.order..=(k + 1) * beam.order];
                 (0..beam.elements.len()).map(|k| nodes(k).iter().map(|number| node(number).u).collect()).collect()
             };
-            let elements: HashSet<Vec<Slot>> = mesh.beams.iter().flat_map(of_beam).collect();
+            let elements: Vec<Vec<Slot>> = mesh.beams.iter().flat_map(of_beam).collect();
             let mut ends: HashMap<Slot, usize> = HashMap::new();
             let both_ends = elements.iter().flat_map(|nodes| [nodes[0], nodes[nodes.len() - 1]]);
             both_ends.for_each(|end| *ends.entry(end).or_default() += 1);
             let mut acts_at: HashSet<Slot> = self.acting.iter().copied().collect();
-            acts_at.extend(coupled(mesh, effects, &elements));
+            acts_at.extend(coupled(mesh, effects, &elements.into_iter().collect()));
             let is_plain = |at: &Node| ends[&at.u] == 2 && !acts_at.contains(&at.u);
             let nodes_between = |beam: &MeshBeam| {
                 let inner = &beam.nodes[1..beam.nodes.len() - 1];
@@ -103,7 +103,8 @@ impl BeamPoints<'_> {
     pub fn point(&self, number: usize, fraction: f64, place: (usize, f64), next: Option<(usize, f64)>) -> BeamPoint {
         let beam = &self.mesh.beams[number];
         let between = &self.actions.of_beams(self.mesh, self.effects)[number];
-        let (frame, behind) = (beam.frame(fraction), beam.frame_behind(fraction));
+        let frame = beam.frame(fraction);
+        let behind = if next.is_some() { beam.frame_behind(fraction) } else { frame };
         let is_smooth = || between.smooth[place.0 - beam.elements.start] && (frame - behind).max_abs() < STRAIGHT;
         let side = |(element, xi): (usize, f64), frame: Mat3| BeamSide { element: element as u32, xi, frame };
         let stiffness = beam.section.at(fraction).stiffness;

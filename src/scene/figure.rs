@@ -46,13 +46,13 @@ fn point(points: &BeamPoints, number: usize, k: usize, section: Option<PlacedRec
     let frame = beam.frame(fraction);
     let (element, at) = (beam.elements.start + k / beam.order, k % beam.order);
     let here = (element, 2.0 * at as f64 / beam.order as f64 - 1.0);
-    let here = beam.elements.contains(&element).then_some(here);
     let before = (at == 0 && k > 0).then(|| (element - 1, 1.0));
+    let next = (k + 1 < beam.nodes.len()).then_some(here);
     LinePoint {
         place: Place { nodes: vec![(node.node, node.place, 1.0)], frame, relative: false },
-        inside: match (before, here) {
-            (Some(before), next) => points.point(number, fraction, before, next),
-            (None, _) => points.point(number, fraction, here.unwrap_or((beam.elements.start, -1.0)), None),
+        inside: match before {
+            Some(before) => points.point(number, fraction, before, next),
+            None => points.point(number, fraction, here, None),
         },
         section,
     }

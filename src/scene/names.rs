@@ -244,7 +244,7 @@ impl MeshBeam {
         self.line.axes(piece, self.line.pieces[piece].tangent(t), fraction)
     }
 
-    /// The same; at a corner those of the piece behind it.
+    /// The section axes of the exact curve at a fraction of the length; at a corner those of the piece behind it.
     pub fn frame_behind(&self, fraction: f64) -> Mat3 {
         let (piece, t) = self.line.locate(fraction);
         match self.line.pieces.get(piece + 1).filter(|_| t > 1.0 - 1e-9) {

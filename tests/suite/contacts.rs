@@ -1661,6 +1661,24 @@ fn what_fills_a_funnel_stops_in_it() {
     }
 }
 
+/// Friction takes what is missing of the energy of a ball that fills a funnel, which ends where it sticks.
+#[test]
+fn friction_in_a_funnel_keeps_the_account() {
+    let deck = std::fs::read_to_string("decks/contact/ball_fills_funnel.toml").unwrap();
+    let deck = deck.replace("penetration = 0.02\n", "penetration = 0.02\nfriction = 0.3\n");
+    let (scene, expectations) = deck.split_once("[[expect]]").unwrap();
+    assert!(!expectations.is_empty() && scene.contains("friction"));
+    let run = simulate(scene);
+    let [total, taken] = ["energy.total", "energy.friction"].map(|column| run.end(column));
+    assert!(taken > 1.0 && total.abs() < 1e-3 * taken, "{total} of {taken}");
+    // After its rebounds it is wedged: the tangent of the half angle is below mu.
+    let run = simulate(&scene.replace("end = 0.55", "end = 1.1"));
+    let heights = run.column("ball.z");
+    let late = &heights[heights.len() * 4 / 5..];
+    let [low, high] = [f64::min, f64::max].map(|pick| late.iter().copied().reduce(pick).unwrap());
+    assert!(high - low < 5e-3, "{low} {high}");
+}
+
 /// The least angle to the floor at which friction `mu` at both ends holds a rigid ladder: atan((1 - mu^2)/(2 mu)).
 fn least_angle_of_ladder(mu: f64) -> f64 {
     ((1.0 - mu * mu) / (2.0 * mu)).atan()

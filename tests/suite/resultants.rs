@@ -296,15 +296,57 @@ fn both_sides_of_a_corner_and_of_a_couple_are_written() {
                 assert!((a[k] - b[k]).abs() < 1e-6 * size, "order {order}, {}: {a:?} {b:?}", columns[k]);
             }
         }
-        // The couple.
-        let at = |row: &HashMap<String, String>| (row["length"].parse::<f64>().unwrap() - 0.9).abs() < 1e-9;
-        assert_eq!(one.iter().filter(|row| at(row)).count(), 2, "order {order}");
+        // One row at a node where nothing acts, two at the corner and at the couple, where M jumps by its size.
+        let rows = |length: f64| -> Vec<Vec3> {
+            let is_there =
+                |row: &&HashMap<String, String>| (row["length"].parse::<f64>().unwrap() - length).abs() < 1e-9;
+            let moment =
+                |row: &HashMap<String, String>| Vec3(["M1", "M2", "M3"].map(|name| row[name].parse().unwrap()));
+            one.iter().filter(is_there).map(moment).collect()
+        };
+        assert_eq!([0.2, 0.4, 0.65].map(|length| rows(length).len()), [1, 2, 1], "order {order}");
+        let couple = rows(0.9);
+        assert_eq!(couple.len(), 2, "order {order}");
+        let jump = (couple[1] - couple[0]).norm();
+        assert!((jump - 8.0).abs() < 0.02, "order {order}: {jump}");
         let largest = |name: &str| {
             let values = table(&folder, &format!("{name}/stress.csv")).into_iter();
             values.map(|row| row["vm"].parse::<f64>().unwrap()).fold(0.0, f64::max)
         };
         let [one, two] = [largest("one"), largest("two")];
         assert!((one / two - 1.0).abs() < 1e-6, "order {order}: {one} {two}");
+    }
+}
+
+/// Two beams on one line, of which a light one carries a heavy one at their common nodes: each keeps its own shear, also
+/// where they have one element a span.
+#[test]
+fn beams_on_one_line_carry_each_other() {
+    let section = |name: &str, size: f64, mass: f64| {
+        format!(
+            "[section.{name}]\nEA = {0:e}\nGA = {0:e}\nGJ = {1:e}\nEI = {1:e}\nrhoA = {mass}\n",
+            1e7 * size,
+            1e4 * size
+        )
+    };
+    let beam = |name: &str| {
+        format!(
+            "[[beam]]\nname = \"{name}\"\nsection = \"{name}\"\nthrough = [\"a\", \"b\", \"c\"]\nelements = [1, 1]\n"
+        )
+    };
+    let deck = format!(
+        "gravity = [0, 0, -9.81]\n[point]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [2, 0, 0]\n{}{}{}{}\
+         [[support]]\nat = \"a\"\nfix = \"all\"\n[output]\nnodes = [\"stiff@0.05\", \"stiff@0.95\"]\ncolumns = [\"resultant\"]\n{STATIC}",
+        section("stiff", 1.0, 0.0),
+        section("soft", 1e-5, 5.0),
+        beam("stiff"),
+        beam("soft")
+    );
+    let run = simulate(&deck);
+    // The soft beam rests on its nodes: half of its weight at the end, all of a span in the middle.
+    for (column, spans) in [("stiff@0.05.N3", 1.5), ("stiff@0.95.N3", 0.5)] {
+        let expected = -5.0 * 9.81 * spans;
+        assert!((run.end(column) / expected - 1.0).abs() < 1e-3, "{column}: {} for {expected}", run.end(column));
     }
 }
 

@@ -133,12 +133,13 @@ impl BeamPoint {
         self.sides.iter().filter_map(|side| self.at(side, cache)).collect()
     }
 
-    /// The resultants between which they jump: those of both sides, or else the mean.
-    pub fn resultants(&self, cache: &mut ElementCache) -> Vec<[f64; 6]> {
-        match self.jumps {
-            true => self.at_sides(cache).into_iter().map(|[_, resultant]| resultant).collect(),
-            false => vec![self.strain_and_stress(cache)[1]],
+    /// N and M on both sides, each in its section axes, where they jump.
+    pub fn jump(&self, cache: &mut ElementCache) -> Option<[[f64; 6]; 2]> {
+        if !self.jumps {
+            return None;
         }
+        let sides: Vec<[f64; 6]> = self.at_sides(cache).into_iter().map(|[_, resultant]| resultant).collect();
+        sides.try_into().ok()
     }
 
     /// The point seen from each of its sides alone, where resultants jump; otherwise the point.

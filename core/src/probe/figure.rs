@@ -63,7 +63,7 @@ pub struct Look {
     pub strain: [f64; 6],
     /// N and M, section axes: mean of both sides
     pub resultant: [f64; 6],
-    /// The same on both sides, where it jumps
+    /// N and M on both sides where they jump, each in its own section axes; for points with stresses
     pub jump: Option<[[f64; 6]; 2]>,
     /// Strain energy per length
     pub energy: f64,
@@ -133,7 +133,7 @@ impl LinePoint {
         // Energy of the strains that have stress: free strains have none.
         let stress = Vector6::from(resultant);
         let energy = self.inside.compliance.map_or(0.0, |compliance| 0.5 * stress.dot(&(compliance * stress)));
-        let jump = self.inside.resultants(cache).try_into().ok();
+        let jump = self.section.as_ref().and_then(|_| self.inside.jump(cache));
         Look { strain, resultant, jump, energy, ..bare(&self.place, cache.state) }
     }
 }

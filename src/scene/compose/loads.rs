@@ -19,8 +19,8 @@ impl Composer<'_> {
             let Some(amplitude) = self.amplitude_of_load(load) else { continue };
             let Some(frame) = self.load_axes(load, at, node, on) else { continue };
             let node = self.mesh.nodes[node].node;
-            self.out.loaded.extend(load.force.map(|_| node));
-            self.out.turned.extend(load.moment.map(|_| node));
+            self.out.with_force.extend(load.force.map(|_| node));
+            self.out.with_moment.extend(load.moment.map(|_| node));
             let at_node = |vector: LoadVector| NodeForce { node, vector: frame * Vec3(vector.start), amplitude };
             let own = loads.in_frame(load.frame);
             own.forces.extend(load.force.map(at_node));

@@ -74,9 +74,9 @@ pub struct Composition {
     /// Springs to ground
     pub(super) springs: Vec<GroundSpring>,
     /// Nodes with a force of a [[load]]
-    pub(super) loaded: Vec<Node>,
+    pub(super) with_force: Vec<Node>,
     /// Nodes with a moment of a [[load]]
-    pub(super) turned: Vec<Node>,
+    pub(super) with_moment: Vec<Node>,
     /// Slots of multipliers, behind those of the mesh: what they hold, and the joint
     pub(super) multipliers: Vec<(SlotKind, String)>,
     /// Components of these that nothing uses
@@ -98,8 +98,8 @@ impl Composition {
         let springs = self.springs.iter().map(|spring| spring.node);
         let links = self.links.iter().flat_map(|link| link.nodes);
         let touching = self.contacts.iter().flat_map(|contacts| contacts.nodes_of_beams());
-        let forces = self.loaded.iter().copied().chain(bodies).chain(springs).chain(links).chain(touching);
-        forces.map(|node| node.u).chain(self.turned.iter().map(|node| node.p))
+        let forces = self.with_force.iter().copied().chain(bodies).chain(springs).chain(links).chain(touching);
+        forces.map(|node| node.u).chain(self.with_moment.iter().map(|node| node.p))
     }
 
     /// Lengths of bodies: radii of gyration and of contact.
@@ -150,8 +150,8 @@ pub fn compose(
         bodies: Vec::new(),
         links: Vec::new(),
         springs: Vec::new(),
-        loaded: Vec::new(),
-        turned: Vec::new(),
+        with_force: Vec::new(),
+        with_moment: Vec::new(),
         multipliers: Vec::new(),
         idle_multipliers: Vec::new(),
         slider_motions: Vec::new(),

@@ -122,15 +122,14 @@ impl Chain {
         if self.order == 0 { 0 } else { self.elements() }
     }
 
-    /// What the forces of its points act on: elements, and nodes alone, since most points are at nodes.
+    /// The number of its instances: elements, and single nodes, at which most points are.
     pub(super) fn instances(&self) -> usize {
         self.spans() + self.nodes.len()
     }
 
-    /// Shows the nodes of each instance, elements first.
-    pub(super) fn each_instance(&self, show: &mut dyn FnMut(&[ChainNode])) {
-        (0..self.spans()).for_each(|k| show(self.nodes_of(k)));
-        self.nodes.chunks(1).for_each(show);
+    /// The nodes of each instance, elements first.
+    pub(super) fn nodes_of_instances(&self) -> impl Iterator<Item = &[ChainNode]> {
+        (0..self.spans()).map(|k| self.nodes_of(k)).chain(self.nodes.chunks(1))
     }
 
     /// The instance that the force of a candidate acts on.
@@ -157,8 +156,8 @@ impl Chain {
         let of_edges = |k: usize| {
             let gap = |candidate: Candidate| {
                 let place = seen.place(k, candidate.s);
-                let edge = candidate.edge.and_then(|number| surface.edge(number)?.value(place));
-                edge.map_or(f64::INFINITY, |value| value - self.radius).min(gap(place))
+                let edge = candidate.edge.and_then(|number| surface.edge(number));
+                edge.map_or(f64::INFINITY, |edge| edge.value(place) - self.radius).min(gap(place))
             };
             let at_edges = if self.order == 0 { Vec::from_iter(seen.rim_of_body()) } else { seen.closest_to_edges(k) };
             at_edges.into_iter().map(gap).fold(f64::INFINITY, f64::min)

@@ -329,10 +329,10 @@ impl Effect for SurfaceContacts {
         for chain in &self.chains {
             let carrier = self.surfaces[chain.surface].slots();
             let blocks = self.laws[chain.contact].blocks_of_node();
-            chain.each_instance(&mut |nodes| {
+            for nodes in chain.nodes_of_instances() {
                 let slots = nodes.iter().flat_map(|node| [node.node.u, node.node.p].into_iter().take(blocks));
                 connectivity.push(slots.chain(carrier.into_iter().flatten()));
-            });
+            }
         }
         connectivity
     }

@@ -63,6 +63,9 @@ pub(super) struct RoundedLength<T> {
 impl<T: Real> RoundedLength<T> {
     /// `None` for vectors as long as `blunt`, the b of the formula, and longer ones.
     pub(super) fn of(vector: Vec3<T>, blunt: f64) -> Option<Self> {
+        if blunt == 0.0 {
+            return None;
+        }
         let square = vector.squared();
         (square.largest() < blunt * blunt).then(|| {
             let square = square * (1.0 / (blunt * blunt));
@@ -93,7 +96,7 @@ pub enum Feature {
     End,
 }
 
-/// Reasons for which a point has no distance with a normal.
+/// Reasons for which a point has no distance with a normal. In the middle of holes it has one ([`Rounding`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Undefined {
     /// The point is the centre of a sphere or of a spherical end
@@ -115,7 +118,8 @@ pub enum Undefined {
 pub struct Distance<T = f64> {
     /// phi, a length, positive in free space
     pub(crate) value: T,
-    /// n, the gradient of phi, a unit vector into free space, shorter on the axis of a hole, in the axes of the carrier
+    /// n, the gradient of phi, into free space, in the axes of the carrier; a unit vector, but shorter near the axis of a
+    /// hole ([`RoundedLength`])
     pub(crate) normal: Vec3<T>,
     /// H, the Hessian of phi, one over length, in the axes of the carrier
     pub(super) curvature: Mat3<T>,

@@ -194,13 +194,16 @@ impl Edge {
         }
     }
 
-    /// The exact distance of the point `y`.
-    pub fn value(&self, y: Vec3) -> Option<f64> {
+    /// The distance of the point `y`, also where it has no normal, and without the rounding in the middle of a rim.
+    pub fn value(&self, y: Vec3) -> f64 {
         match self {
-            Self::Straight(edge) => edge.distance(y).ok().map(|distance| distance.value),
+            Self::Straight(edge) => {
+                let d = y - edge.middle;
+                (d - edge.along * edge.along.dot(d).clamp(-edge.half, edge.half)).norm()
+            }
             Self::Rim(rim, _) => {
                 let [beyond, across] = rim.along_and_across(y);
-                Some(beyond.hypot(across - rim.radius))
+                beyond.hypot(across - rim.radius)
             }
         }
     }

@@ -7,19 +7,20 @@
 //!
 //! ```text
 //! u  = a - n (n.a)
-//! t* = t0 - (n.t0) s (n0+n) - K_t u,   s = 1/(1 + n0.n)
+//! t* = t0 - l (n0+n) - K_t u,   l = (n-n0).t0 s,  s = 1/(1 + n0.n)
 //! t  = t* if |t*| <= mu p, otherwise mu p t*/|t*|
 //! ```
 //!
 //! and, with e = t*/|t*|,
 //!
 //! ```text
-//! dt* = -(n0+n) (t0 s - (n.t0) s^2 n0).dn - (n.t0) s dn - K_t du
+//! dt* = -(n0+n) (t0 s - l s n0).dn - l dn - K_t du
 //! du  = da - n (n.da) - dn (n.a) - n (a.dn)
 //! stick dt = dt*;   slip dt = mu e dp + (mu p/|t*|) (dt* - e (e.dt*))
 //! ```
 //!
-//! The tangent of slip is not symmetric.
+//! The tangent of slip is not symmetric. In the middle of a hole that a contact fills n is the mean of the normals all
+//! round, and shorter than one: t may have a part along it there.
 
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
@@ -27,6 +28,9 @@ use serde::{Deserialize, Serialize};
 
 /// Normals that turn by more than 120 degrees between converged states: 1 + n0.n is below this.
 const MIN_NORMAL_COSINE: f64 = 0.5;
+
+/// Squares of shorter normals than this are those of means all round a hole.
+const UNIT: f64 = 1.0 - 1e-9;
 
 /// A traction of at least this part of its limit is at the limit, but for round-off.
 const AT_LIMIT: f64 = 1.0 - 1e-9;
@@ -76,13 +80,17 @@ impl CarriedTraction {
     ///
     /// With b the angle between them it is (n0 + n) tan(b/2)/b, a function of s = tan^2(b/2) = (1 - n0.n)/(1 + n0.n):
     /// of the continued fraction of atan four terms are taken, which err by 1e-3 at a right angle, 1e-5 at half of it.
+    /// In the middle of a hole it is the mean of both.
     pub fn rolling_normal<T: Real>(&self, n: Vec3<T>) -> RollingNormal<T> {
         let n0 = Vec3::constant(self.normal);
         let cosine = n0.dot(n);
+        let number = T::constant;
+        if self.normal != Vec3::ZERO && (self.normal.squared() < UNIT || n.squared().largest() < UNIT) {
+            return RollingNormal { value: (n0 + n) * number(0.5), over_normal: Mat3::diagonal([number(0.5); 3]) };
+        }
         if cosine.largest() <= 0.0 {
             return RollingNormal { value: n, over_normal: Mat3::identity() };
         }
-        let number = T::constant;
         let one = T::one();
         let inverse = one / (one + cosine);
         let s = (one - cosine) * inverse;
@@ -149,7 +157,7 @@ impl<T: Real> Turn<T> {
         let Self { n0, n, cosine } = *self;
         let vector = Vec3::constant(vector);
         let s = T::one() / cosine;
-        let lift = n.dot(vector) * s;
+        let lift = (n - n0).dot(vector) * s;
         let by_normal = (n0 + n).outer(vector * s - n0 * (lift * s)) + Mat3::identity() * lift;
         TurnedVector { value: vector - (n0 + n) * lift, over_normal: -by_normal }
     }
@@ -175,7 +183,7 @@ pub struct Traction<T = f64> {
     pub(crate) force: Vec3<T>,
     /// Stick or slip
     pub(crate) status: Status,
-    /// u, the tangential sliding since the last converged state
+    /// u, the tangential sliding since the last converged state; in the middle of a hole a, all of it
     pub(crate) sliding: Vec3<T>,
     /// True if the normal has turned by more than 120 degrees: the step is too large
     pub(crate) turned_over: bool,
@@ -247,9 +255,10 @@ impl FrictionLaw {
         let along = n.dot(a);
         let sliding = a - n * along;
         let stiffness = self.stiffness;
+        let is_unit = n.squared().largest() >= UNIT;
         let mut trial = Traction {
             force: -sliding.scale(stiffness),
-            sliding,
+            sliding: if is_unit { sliding } else { a },
             over_sliding: (n.outer(n) - Mat3::identity()).scale(stiffness),
             over_normal: (Mat3::diagonal([along; 3]) + n.outer(a)).scale(stiffness),
             ..Traction::none()

@@ -233,7 +233,8 @@ struct Point<'a, const N: usize, T> {
     state: &'a PointState<T>,
 }
 
-/// The blocks of a node in the system of a contact point.
+/// The blocks of a node in the system of a contact point: all points of a contact have the same, also those without
+/// friction of a contact whose coefficient is zero at one end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum NodeBlocks {
     /// Its displacements

@@ -172,6 +172,18 @@ impl<const N: usize> Scene<N> {
         (out, state)
     }
 
+    /// The system of a contact without friction: nodes have displacements alone.
+    fn of_displacements(&self, weights: Weights) -> ElementSystem {
+        let nodes = self.nodes(&from_fn(|i| Unknowns::of(&self.bodies[i])));
+        let carrier = self.carrier(&Unknowns::of(&self.carrier), weights);
+        let shape = ShapeAt::new(self.s);
+        let point = carrier.on_surface(weighted_sum(&shape.values, |i| nodes[i].place));
+        let distance = self.surface.distance(point).unwrap();
+        let mut out = ElementSystem::new(self.blocks() - N);
+        add_point((&nodes, None), &shape, &carrier, &distance, &self.law, weights, &mut out);
+        out
+    }
+
     fn now(&self, weights: Weights) -> (ElementSystem, PointState) {
         self.evaluate(&from_fn(|i| Unknowns::of(&self.bodies[i])), &Unknowns::of(&self.carrier), self.s, weights)
     }
@@ -218,6 +230,36 @@ impl<const N: usize> Scene<N> {
             ..*self
         }
     }
+}
+
+/// Without friction a contact acts on displacements alone, with the same forces and the same tangent.
+#[test]
+fn points_without_friction_leave_out_rotations() {
+    let mut random = Random(51);
+    let mut compared = 0;
+    for (name, shape) in shapes() {
+        let surface = Surface { shape, side: Side::Outside };
+        for carried_by in [CarriedBy::Ground, CarriedBy::Motion, CarriedBy::Node] {
+            for (place, damped) in [(Place::Fixed, true), (Place::Closest, false)] {
+                let kind = Kind { carried_by, place, friction: false, damped };
+                let Some(scene) = (0..50).find_map(|_| random_scene::<2>(&mut random, &surface, kind)) else {
+                    continue;
+                };
+                let (whole, compact) = (scene.now(WEIGHTS).0, scene.of_displacements(WEIGHTS));
+                // Rotations of the two nodes are the blocks 1 and 3 of the whole.
+                let of_whole = [0, 2, 4, 5];
+                for i in 0..compact.blocks() {
+                    assert_eq!(compact.force_block(i), whole.force_block(of_whole[i]), "{name} {kind:?}");
+                    for j in 0..compact.blocks() {
+                        let [a, b] = [compact.tangent_block(i, j), whole.tangent_block(of_whole[i], of_whole[j])];
+                        assert_eq!(a, b, "{name} {kind:?} {i} {j}");
+                    }
+                }
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 40, "{compared}");
 }
 
 /// The kinds of scenes.
