@@ -96,7 +96,7 @@ pub enum Feature {
     End,
 }
 
-/// Reasons for which a point has no distance with a normal. In the middle of holes it has one ([`Rounding`]).
+/// Reasons for which a point has no distance with a normal. In the middle of holes it has one, since the distance from the axis is rounded off there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Undefined {
     /// The point is the centre of a sphere or of a spherical end
@@ -119,7 +119,7 @@ pub struct Distance<T = f64> {
     /// phi, a length, positive in free space
     pub(crate) value: T,
     /// n, the gradient of phi, into free space, in the axes of the carrier; a unit vector, but shorter near the axis of a
-    /// hole ([`RoundedLength`])
+    /// hole, where the distance from it is rounded off
     pub(crate) normal: Vec3<T>,
     /// H, the Hessian of phi, one over length, in the axes of the carrier
     pub(super) curvature: Mat3<T>,
