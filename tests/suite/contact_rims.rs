@@ -175,7 +175,7 @@ fn wires_slide_out_of_tubes_without_a_loss() {
 /// away from the circle.
 #[test]
 fn balls_rest_on_rims() {
-    let ball = |side: &str, place: [f64; 3], free: &str, force: [f64; 3]| {
+    let ball = |side: &str, radius: &str, place: [f64; 3], free: &str, force: [f64; 3]| {
         let fixed: Vec<String> = ["ux", "uy", "uz", "rx", "ry", "rz"]
             .iter()
             .filter(|name| **name != free)
@@ -185,7 +185,7 @@ fn balls_rest_on_rims() {
         let deck = format!(
             "[point]\nb = {place:?}\n[[body]]\nat = \"b\"\nmass = 1\n[[support]]\nat = \"b\"\nfix = [{}]\n\
              [[spring]]\nat = \"b\"\nstiffness = {spring:?}\n[[load]]\nat = \"b\"\nforce = {force:?}\n\
-             [[surface]]\nname = \"t\"\nkind = \"tube\"\nside = \"{side}\"\nthrough = [[-1, 0, 0], [0, 0, 0]]\nradius = 0.02\n\
+             [[surface]]\nname = \"t\"\nkind = \"tube\"\nside = \"{side}\"\nthrough = [[-1, 0, 0], [0, 0, 0]]\nradius = {radius}\n\
              [[contact]]\nname = \"c\"\nnodes = [\"b\"]\nsurfaces = [\"t\"]\nradius = 0.03\nstiffness = 1e4\npenetration = 1e-7\n\
              [[stage]]\nkind = \"static\"\nsteps = 20\n[output]\nnodes = [\"b\"]\ncolumns = [\"x\", \"contact\"]\n",
             fixed.join(", ")
@@ -193,14 +193,19 @@ fn balls_rest_on_rims() {
         let simulation = simulate(&deck);
         (Vec3(simulation.vector("b.")), simulation.end("c.normal"))
     };
-    let (place, normal) = ball("inside", [0.04, 0.005, 0.0], "ux", [-1.0, 0.0, 0.0]);
+    let (place, normal) = ball("inside", "0.02", [0.04, 0.005, 0.0], "ux", [-1.0, 0.0, 0.0]);
     let exact = (0.03_f64.powi(2) - 0.015_f64.powi(2)).sqrt();
     assert!((place.0[0] - exact).abs() < 1e-6, "{place:?} {exact}");
     let push = 1.0 - 10.0 * (0.04 - exact);
     assert!((normal - push * 0.03 / exact).abs() < 1e-3 * normal, "{normal}");
-    let (place, normal) = ball("outside", [0.01, 0.0, 0.06], "uz", [0.0, 0.0, -1.0]);
+    let (place, normal) = ball("outside", "0.02", [0.01, 0.0, 0.06], "uz", [0.0, 0.0, -1.0]);
     let exact = (0.03_f64.powi(2) - 0.01_f64.powi(2)).sqrt();
     assert!((place.0[2] - 0.02 - exact).abs() < 1e-6, "{place:?} {exact}");
     let push = 1.0 - 10.0 * (0.06 - 0.02 - exact);
     assert!((normal - push * 0.03 / exact).abs() < 1e-3 * normal, "{normal}");
+    // The wall of a tube that widens leans back: it ends where the plane normal to it goes through the end of the axis.
+    let (tilt, wide, before) = (0.29, 0.3, 0.006);
+    let (place, _) = ball("outside", "[0.01, 0.3]", [-wide * tilt - before, 0.0, 0.35], "uz", [0.0, 0.0, -1.0]);
+    let exact = wide * (1.0 - tilt * tilt).sqrt() + (0.03_f64.powi(2) - before * before).sqrt();
+    assert!((place.0[2] - exact).abs() < 1e-6, "{place:?} {exact}");
 }
