@@ -1212,6 +1212,8 @@ fn wires_on_the_axis_of_straight_tubes_touch_nothing() {
         let moved = Vec3(simulation.vector("B.u"));
         let exact = along * (0.7 * half / 1e4);
         assert!((moved - exact).norm() < 1e-9 * half, "{case}: {moved:?}\n{text}");
+        let gap = simulation.end("k.gap");
+        assert!((gap - 0.8 * radius).abs() < 1e-6 * radius, "{case}: {gap}\n{text}");
     }
 }
 
