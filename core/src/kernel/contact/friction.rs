@@ -29,7 +29,7 @@ use serde::{Deserialize, Serialize};
 /// Normals that turn by more than 120 degrees between converged states: 1 + n0.n is below this.
 const MIN_NORMAL_COSINE: f64 = 0.5;
 
-/// Squares of shorter normals than this are those of means all round a hole.
+/// A normal whose square is below this is the mean of those all round a hole.
 const UNIT: f64 = 1.0 - 1e-9;
 
 /// A traction of at least this part of its limit is at the limit, but for round-off.

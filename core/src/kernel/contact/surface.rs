@@ -114,6 +114,7 @@ impl Surface {
         self.rounded_distance(y, Rounding::of(self.side))
     }
 
+    /// The distance that is rounded off in the middle of holes as `rounding` says.
     fn rounded_distance<T: Real>(&self, y: Vec3<T>, rounding: Rounding) -> Result<Distance<T>, Undefined> {
         let outside = self.shape.distance(y, rounding)?;
         match self.side {
