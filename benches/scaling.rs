@@ -1,7 +1,8 @@
 //! Microseconds per element and Newton iteration, split into evaluation, assembly and solve, for chains of 10 to 100,000
 //! elements in statics and dynamics; then what points in contact and lists of near elements cost.
 //!
-//! `cargo bench --bench scaling` prints the table; `-- --smoke` runs the small sizes only, `-- --elements 10000,1000000` these.
+//! `cargo bench --bench scaling` prints the table; `-- --smoke` runs the small sizes only, `-- --elements 10000,1000000` these,
+//! `-- --contacts` contacts alone.
 
 use beamsim::scene;
 use beamsim_core::effect::RoundOff;
@@ -253,7 +254,14 @@ fn sizes() -> Vec<usize> {
 }
 
 fn main() {
-    let sizes = &sizes()[..];
+    let sizes = sizes();
+    if !std::env::args().any(|argument| argument == "--contacts") {
+        elements_table(&sizes);
+    }
+    contacts_table(&sizes);
+}
+
+fn elements_table(sizes: &[usize]) {
     println!("microseconds per element and iteration");
     println!(
         "{:<8} {:<9} {:>8} {:>11} {:>9} {:>9} {:>9}",
@@ -272,6 +280,9 @@ fn main() {
         // Parts of ten elements are over before a clock ticks often enough.
         sizes.iter().filter(|&&elements| elements > 10).for_each(|&elements| parts(elements, dynamic, interpolation));
     }
+}
+
+fn contacts_table(sizes: &[usize]) {
     let largest = sizes.iter().copied().max().unwrap_or_default();
     let in_contact = largest.min(1_000);
     println!("\npoints in contact, nanoseconds per point");

@@ -47,7 +47,7 @@ impl<'a> ChainNow<'a> {
             return;
         }
         let of_carrier = if self.carrier.is_node { 2 } else { 0 };
-        let system_of = |nodes: usize| ElementSystem::new(nodes * self.laws.blocks_of_node() + of_carrier);
+        let system_of = |nodes: usize| ElementSystem::new(self.laws.blocks_of_node().of(nodes) + of_carrier);
         let mut of_node = system_of(1);
         let mut of_element = system_of(self.chain.order + 1);
         for (candidate, predecessors) in self.candidates.iter().zip(&self.predecessors) {

@@ -1,6 +1,6 @@
 //! The laws of a contact, and bounds that surfaces and pairs of beams share.
 
-use crate::kernel::contact::{CarriedTraction, FrictionLaw, NormalLaw, PointState, Status};
+use crate::kernel::contact::{CarriedTraction, FrictionLaw, NodeBlocks, NormalLaw, PointState, Status};
 use crate::system::{ContactMemory, ContactRegime, ContactStiffness};
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
@@ -129,8 +129,8 @@ impl ContactLaws {
         self.friction != [0.0; 2]
     }
 
-    /// Blocks of a node of a beam or a body that touches a surface: its displacements, and with friction its rotation.
-    pub(super) fn blocks_of_node(&self) -> usize {
-        if self.rubs() { 2 } else { 1 }
+    /// The blocks of a node in a contact point.
+    pub(super) fn blocks_of_node(&self) -> NodeBlocks {
+        NodeBlocks::with(self.rubs())
     }
 }

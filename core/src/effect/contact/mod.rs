@@ -330,7 +330,7 @@ impl Effect for SurfaceContacts {
             let carrier = self.surfaces[chain.surface].slots();
             let blocks = self.laws[chain.contact].blocks_of_node();
             for nodes in chain.nodes_of_instances() {
-                let slots = nodes.iter().flat_map(|node| [node.node.u, node.node.p].into_iter().take(blocks));
+                let slots = nodes.iter().flat_map(|node| node.slots(blocks));
                 connectivity.push(slots.chain(carrier.into_iter().flatten()));
             }
         }
@@ -339,7 +339,10 @@ impl Effect for SurfaceContacts {
 
     fn connectivity_with(&self, pairs: &[ListedPair]) -> Connectivity {
         let mut connectivity = self.connectivity();
-        pairs.iter().for_each(|pair| connectivity.push(self.pairs.slots(pair)));
+        for pair in pairs {
+            let blocks = self.pairs().law_of(pair.meeting).blocks_of_node();
+            connectivity.push(self.pairs.slots(pair, blocks));
+        }
         connectivity
     }
 

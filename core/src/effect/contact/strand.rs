@@ -1,6 +1,7 @@
 //! A beam or a body in contact: its nodes, its radius, its stiffness.
 
-use crate::system::{ContactStiffness, Node};
+use crate::kernel::contact::NodeBlocks;
+use crate::system::{ContactStiffness, Node, Slot};
 use crate::tensor::Vec3;
 
 /// A node of a strand.
@@ -12,6 +13,13 @@ pub struct ChainNode {
     pub place: Vec3,
     /// The part of the length of the beam before it
     pub fraction: f64,
+}
+
+impl ChainNode {
+    /// The slots of its blocks.
+    pub fn slots(&self, blocks: NodeBlocks) -> impl Iterator<Item = Slot> + use<> {
+        [self.node.u, self.node.p].into_iter().take(blocks.count())
+    }
 }
 
 /// A beam or a body in contact.

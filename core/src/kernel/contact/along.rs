@@ -112,6 +112,13 @@ pub struct Minima {
 }
 
 impl Minima {
+    /// One minimum at most.
+    pub(super) fn of(minimum: Option<Minimum>) -> Self {
+        let mut out = Self::default();
+        minimum.into_iter().for_each(|minimum| out.push(minimum));
+        out
+    }
+
     /// The minima.
     pub fn found(&self) -> &[Minimum] {
         &self.found[..self.count]

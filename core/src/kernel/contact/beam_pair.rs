@@ -40,7 +40,7 @@ use super::along::{ShapeAt, weighted_sum};
 use super::friction::{CarriedTraction, FrictionLaw, Status, Traction};
 use super::law::NormalLaw;
 use super::point::PointState;
-use super::variation::{Change, Column, ContactNode, Derived, NodeTurning, Turned};
+use super::variation::{Change, Column, ContactNode, Derived, NodeBlocks, NodeTurning, Turned};
 use crate::kernel::element::{ElementSystem, MAX_NODES, Weights};
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
@@ -98,8 +98,12 @@ const MAX_BLOCKS: usize = 4 * MAX_NODES;
 /// A vector for each block of a pair.
 type ByBlock<T> = [Vec3<T>; MAX_BLOCKS];
 
+/// A vector for the displacements of each node of a pair.
+type ByNode<T> = [Vec3<T>; 2 * MAX_NODES];
+
 /// Adds the forces of a pair of points to `out`, and the tangent of the weights: blocks x_1, P_1, …
-/// of A, then those of B. `None` if the centre lines meet, where there is no normal.
+/// of A, then those of B, or x_1, x_2, … where it is not given how nodes are turned. `None` if the centre lines meet,
+/// where there is no normal.
 pub fn add_pair<const NA: usize, const NB: usize, T: Real>(
     a: &PairSide<NA, T>,
     b: &PairSide<NB, T>,
@@ -139,7 +143,9 @@ pub fn add_pair<const NA: usize, const NB: usize, T: Real>(
         let sliding = place - before - rolling.cross(law.carried.rolling_normal(normal).value);
         state.traction = friction.traction(&law.carried, normal, normal_force.force, sliding);
     }
-    let pair = Pair { a, b, law, q, place, normal, curvature, rate, arms, turned, angles, rolling, state: &state };
+    let blocks = NodeBlocks::with(a.turning.is_some());
+    let pair =
+        Pair { a, b, law, blocks, q, place, normal, curvature, rate, arms, turned, angles, rolling, state: &state };
     pair.add(weights, out);
     Some(state)
 }
@@ -149,6 +155,7 @@ struct Pair<'a, const NA: usize, const NB: usize, T> {
     a: &'a PairSide<NA, T>,
     b: &'a PairSide<NB, T>,
     law: &'a PairLaw,
+    blocks: NodeBlocks,
     /// Q
     q: Mat3<T>,
     /// y
@@ -186,7 +193,20 @@ struct LoadChange<'a, const NA: usize, const NB: usize, T> {
 }
 
 impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
-    const BLOCKS: usize = 2 * (NA + NB);
+    /// The number of blocks.
+    const fn count(&self) -> usize {
+        self.blocks.of(NA + NB)
+    }
+
+    /// The block of the displacements of node `i` of A.
+    const fn on_a(&self, i: usize) -> usize {
+        self.blocks.of(i)
+    }
+
+    /// The block of the displacements of node `k` of B.
+    const fn on_b(&self, k: usize) -> usize {
+        self.blocks.of(NA + k)
+    }
 
     fn add(&self, weights: Weights, out: &mut ElementSystem<T>) {
         let loads = self.loads();
@@ -194,7 +214,7 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         let moments = [loads.moments[0].value, loads.moments[1].value];
         let mut forces = [Vec3::zero(); MAX_BLOCKS];
         self.distribute(&LoadChange { force: loads.force.value, moments, factors: values }, &mut forces);
-        for block in 0..Self::BLOCKS {
+        for block in 0..self.count() {
             out.add_force(block, forces[block]);
         }
         if weights.stiffness == 0.0 && weights.damping == 0.0 {
@@ -253,35 +273,35 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         let spatial = self.q * loads.force;
         let (on_a, on_b) = loads.factors;
         for i in 0..NA {
-            forces[2 * i] += -spatial * on_a[i];
+            forces[self.on_a(i)] += -spatial * on_a[i];
         }
         for k in 0..NB {
-            forces[2 * (NA + k)] += spatial * on_b[k];
+            forces[self.on_b(k)] += spatial * on_b[k];
         }
         let Some((turned_a, turned_b)) = &self.turned else { return };
         for i in 0..NA {
             let material = turned_a.rotations[i].transpose_mul(loads.moments[0]);
-            forces[2 * i + 1] += turned_a.nodes[i].rotation.t.transpose_mul(material) * on_a[i];
+            forces[self.on_a(i) + 1] += turned_a.nodes[i].rotation.t.transpose_mul(material) * on_a[i];
         }
         for k in 0..NB {
             let material = turned_b.rotations[k].transpose_mul(loads.moments[1]);
-            forces[2 * (NA + k) + 1] += turned_b.nodes[k].rotation.t.transpose_mul(material) * on_b[k];
+            forces[self.on_b(k) + 1] += turned_b.nodes[k].rotation.t.transpose_mul(material) * on_b[k];
         }
     }
 
     /// The block of the rotation of the carrier.
     fn carrier(&self) -> usize {
-        2 * (NA + self.law.carrier) + 1
+        self.on_b(self.law.carrier) + 1
     }
 
     /// Adds the derivatives of F and of the moments, without those of Q, T and S.
     fn add_columns(&self, loads: &Loads<T>, weights: Weights, out: &mut ElementSystem<T>) {
         let mut displacements = [(0, T::zero()); 2 * MAX_NODES];
         for i in 0..NA {
-            displacements[i] = (2 * i, self.a.shape.values[i]);
+            displacements[i] = (self.on_a(i), self.a.shape.values[i]);
         }
         for k in 0..NB {
-            displacements[NA + k] = (2 * (NA + k), -self.b.shape.values[k]);
+            displacements[NA + k] = (self.on_b(k), -self.b.shape.values[k]);
         }
         self.add_column(&displacements[..NA + NB], &self.displacement(weights), loads, out);
         let Some(turned) = &self.turned else { return };
@@ -294,12 +314,12 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         for i in 0..NA {
             let spun = turned_a.maps[i] * (turned_a.rotations[i] * turned_a.nodes[i].rotation.t);
             let rolling = spun * (self.a.shape.values[i] * self.arms[0]);
-            self.add_column(&[(2 * i + 1, T::one())], &column(rolling), loads, out);
+            self.add_column(&[(self.on_a(i) + 1, T::one())], &column(rolling), loads, out);
         }
         for k in 0..NB {
             let spun = turned_b.maps[k] * (turned_b.rotations[k] * turned_b.nodes[k].rotation.t);
             let rolling = spun * (self.b.shape.values[k] * self.arms[1]);
-            self.add_column(&[(2 * (NA + k) + 1, T::one())], &column(rolling), loads, out);
+            self.add_column(&[(self.on_b(k) + 1, T::one())], &column(rolling), loads, out);
         }
         self.add_column(&[(self.carrier(), T::one())], &self.carrier_rotation(turned, weights), loads, out);
     }
@@ -332,20 +352,20 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         let mut add =
             |row: usize, of_row: Mat3<T>| blocks.iter().for_each(|&(block, f)| out.add_tangent(row, block, of_row * f));
         for i in 0..NA {
-            add(2 * i, -spatial * self.a.shape.values[i]);
+            add(self.on_a(i), -spatial * self.a.shape.values[i]);
         }
         for k in 0..NB {
-            add(2 * (NA + k), spatial * self.b.shape.values[k]);
+            add(self.on_b(k), spatial * self.b.shape.values[k]);
         }
         let Some((turned_a, turned_b)) = &self.turned else { return };
         let moments = [loads.moments[0].over(column), loads.moments[1].over(column)];
         for i in 0..NA {
             let material = turned_a.rotations[i].transpose_matmul(moments[0]);
-            add(2 * i + 1, turned_a.nodes[i].rotation.t.transpose_matmul(material) * self.a.shape.values[i]);
+            add(self.on_a(i) + 1, turned_a.nodes[i].rotation.t.transpose_matmul(material) * self.a.shape.values[i]);
         }
         for k in 0..NB {
             let material = turned_b.rotations[k].transpose_matmul(moments[1]);
-            add(2 * (NA + k) + 1, turned_b.nodes[k].rotation.t.transpose_matmul(material) * self.b.shape.values[k]);
+            add(self.on_b(k) + 1, turned_b.nodes[k].rotation.t.transpose_matmul(material) * self.b.shape.values[k]);
         }
     }
 
@@ -355,18 +375,18 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         let carried = turned_b.nodes[self.law.carrier].rotation.t;
         let turned = self.q * Mat3::skew_mul(loads.force.value, carried.scale(weight));
         for i in 0..NA {
-            out.add_tangent(2 * i, self.carrier(), turned * self.a.shape.values[i]);
+            out.add_tangent(self.on_a(i), self.carrier(), turned * self.a.shape.values[i]);
         }
         for k in 0..NB {
-            out.add_tangent(2 * (NA + k), self.carrier(), -(turned * self.b.shape.values[k]));
+            out.add_tangent(self.on_b(k), self.carrier(), -(turned * self.b.shape.values[k]));
         }
         for i in 0..NA {
             let side = (&turned_a.nodes[i], &turned_a.rotations[i], self.a.shape.values[i] * weight);
-            self.add_spin(2 * i + 1, side, loads.moments[0].value, &carried, out);
+            self.add_spin(self.on_a(i) + 1, side, loads.moments[0].value, &carried, out);
         }
         for k in 0..NB {
             let side = (&turned_b.nodes[k], &turned_b.rotations[k], self.b.shape.values[k] * weight);
-            self.add_spin(2 * (NA + k) + 1, side, loads.moments[1].value, &carried, out);
+            self.add_spin(self.on_b(k) + 1, side, loads.moments[1].value, &carried, out);
         }
     }
 
@@ -388,24 +408,16 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
 
     /// Adds -f_s F_ss^-1 F_sq for the free parameters, unless F_ss is not positive definite.
     fn add_moving(&self, loads: &Loads<T>, weight: f64, out: &mut ElementSystem<T>) {
-        let inverse = match invert(self.second_derivatives(), self.law.free) {
-            Some(inverse) => inverse,
-            None => return,
-        };
-        let forces = [self.along_a(loads), self.along_b(loads)];
-        let gradients = [self.gradient_of_s(), self.gradient_of_e()];
-        for (i, force) in forces.iter().enumerate() {
-            for (j, gradient) in gradients.iter().enumerate() {
-                if !(self.law.free[i] && self.law.free[j]) {
-                    continue;
-                }
-                let factor = inverse[i][j] * -weight;
-                for row in 0..Self::BLOCKS {
-                    let scaled = force[row] * factor;
-                    // F depends on displacements alone.
-                    for column in (0..Self::BLOCKS).step_by(2) {
-                        out.add_tangent(row, column, scaled.outer(gradient[column]));
-                    }
+        let Some(inverse) = invert(self.second_derivatives(), self.law.free) else { return };
+        let gradients = self.gradients();
+        for (of_parameter, by) in inverse.iter().enumerate().filter(|(number, _)| self.law.free[*number]) {
+            let forces = if of_parameter == 0 { self.along_a(loads) } else { self.along_b(loads) };
+            // How the parameter moves with the displacements, the only unknowns that F depends on.
+            let moves = |node: usize| (gradients[0][node] * by[0] + gradients[1][node] * by[1]).scale(-weight);
+            for node in 0..NA + NB {
+                let moves = moves(node);
+                for row in 0..self.count() {
+                    out.add_tangent(row, self.blocks.of(node), forces[row].outer(moves));
                 }
             }
         }
@@ -427,30 +439,27 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
         ]
     }
 
-    /// F_s over the displacements.
-    fn gradient_of_s(&self) -> ByBlock<T> {
-        let bent = self.q * (self.curvature * self.tangents()[0]);
+    /// F_s and F_e over the displacements; zero for a parameter that is not free.
+    fn gradients(&self) -> [ByNode<T>; 2] {
+        let mut out = [[Vec3::zero(); 2 * MAX_NODES]; 2];
         let n = self.q * self.normal;
-        let mut out = [Vec3::zero(); MAX_BLOCKS];
-        for i in 0..NA {
-            out[2 * i] = bent * self.a.shape.values[i] + n * self.a.shape.slopes[i];
+        let bent = self.tangents().map(|z| self.q * (self.curvature * z));
+        let (on_a, on_b) = (&self.a.shape, &self.b.shape);
+        if self.law.free[0] {
+            for i in 0..NA {
+                out[0][i] = bent[0] * on_a.values[i] + n * on_a.slopes[i];
+            }
+            for k in 0..NB {
+                out[0][NA + k] = -bent[0] * on_b.values[k];
+            }
         }
-        for k in 0..NB {
-            out[2 * (NA + k)] = -bent * self.b.shape.values[k];
-        }
-        out
-    }
-
-    /// F_e over the displacements.
-    fn gradient_of_e(&self) -> ByBlock<T> {
-        let bent = self.q * (self.curvature * self.tangents()[1]);
-        let n = self.q * self.normal;
-        let mut out = [Vec3::zero(); MAX_BLOCKS];
-        for i in 0..NA {
-            out[2 * i] = -bent * self.a.shape.values[i];
-        }
-        for k in 0..NB {
-            out[2 * (NA + k)] = bent * self.b.shape.values[k] - n * self.b.shape.slopes[k];
+        if self.law.free[1] {
+            for i in 0..NA {
+                out[1][i] = -bent[1] * on_a.values[i];
+            }
+            for k in 0..NB {
+                out[1][NA + k] = bent[1] * on_b.values[k] - n * on_b.slopes[k];
+            }
         }
         out
     }

@@ -52,4 +52,4 @@ pub use mesh_parts::MeshError;
 pub use point::{Carrier, ContactLaw, Place, PointState, add_point};
 pub use surface::{Shape, Surface};
 pub use tube::{Tube, TubeEnds, TubeError};
-pub use variation::{ContactNode, NodeBefore, NodeTurning};
+pub use variation::{ContactNode, NodeBefore, NodeBlocks, NodeTurning};

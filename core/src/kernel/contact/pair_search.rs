@@ -1,6 +1,6 @@
 //! Closest points of two elements, and the advance that keeps their centre lines apart.
 
-use super::along::{Minima, ShapeAt, intervals_of_convex, minima, weighted_sum};
+use super::along::{Minima, Minimum, MinimumKind, ShapeAt, intervals_of_convex, minima, weighted_sum};
 use super::distance::sphere;
 use crate::tensor::Vec3;
 
@@ -168,6 +168,11 @@ impl PairMinima {
 /// where the second derivatives of the distance are not positive definite.
 pub fn bilateral<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB]) -> PairMinima {
     let mut out = PairMinima::default();
+    if let ([a0, a1], [b0, b1]) = (&a[..], &b[..]) {
+        let segments = Segments { a: [*a0, *a1], b: [*b0, *b1] };
+        segments.between_the_ends().into_iter().for_each(|pair| out.offer(pair));
+        return out;
+    }
     for i in 1..NA {
         for k in 1..NB {
             let chords = Segments { a: [a[i - 1], a[i]], b: [b[k - 1], b[k]] };
@@ -262,6 +267,13 @@ fn refine<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB], star
 
 /// The local minima of the distance from a point, between the ends of an element.
 pub fn closest_to_point<const N: usize>(point: Vec3, nodes: &[Vec3; N]) -> Minima {
+    if let [from, to] = nodes[..] {
+        let along = to - from;
+        let s = (point - from).dot(along) / along.squared();
+        let is_on_line = || (from + along * s - point).squared() == 0.0;
+        let kind = |is_on_line: bool| if is_on_line { MinimumKind::Kink } else { MinimumKind::Sharp };
+        return Minima::of((s > 0.0 && s < 1.0).then(|| Minimum { s, kind: kind(is_on_line()) }));
+    }
     minima(nodes, intervals_of_convex(N), &|y| sphere(y - point, 0.0, 0.0).ok())
 }
 

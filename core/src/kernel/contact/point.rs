@@ -59,7 +59,7 @@ use super::along::{ShapeAt, weighted_sum};
 use super::distance::Distance;
 use super::friction::{CarriedTraction, FrictionLaw, Status, Traction};
 use super::law::{NormalForce, NormalLaw};
-use super::variation::{Change, Column, ContactNode, Derived, NodeTurning, Turned};
+use super::variation::{Change, Column, ContactNode, Derived, NodeBlocks, NodeTurning, Turned};
 use crate::kernel::element::{ElementSystem, MAX_NODES, Weights};
 use crate::rotation::Rotation;
 use crate::scalar::Real;
@@ -190,7 +190,7 @@ pub fn add_point<const N: usize, T: Real>(
     let gap = distance.value - T::constant(law.radius);
     let normal_force = law.normal.force(gap, distance.normal.dot(seen.rate));
     let mut state = PointState { gap, normal_force, normal: distance.normal, traction: Traction::none() };
-    let blocks = if turning.is_some() { NodeBlocks::PlaceAndRotation } else { NodeBlocks::Place };
+    let blocks = NodeBlocks::with(turning.is_some());
     if state.status() == Status::Open {
         return state;
     }
@@ -233,28 +233,10 @@ struct Point<'a, const N: usize, T> {
     state: &'a PointState<T>,
 }
 
-/// The blocks of a node in the system of a contact point: all points of a contact have the same, also those without
-/// friction of a contact whose coefficient is zero at one end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum NodeBlocks {
-    /// Its displacements
-    Place,
-    /// Its displacements, and its rotation
-    PlaceAndRotation,
-}
-
 impl<const N: usize, T: Real> Point<'_, N, T> {
-    /// The block of the displacements of node `i`; with friction the block of its rotation follows.
-    const fn block_of(&self, i: usize) -> usize {
-        match self.blocks {
-            NodeBlocks::Place => i,
-            NodeBlocks::PlaceAndRotation => 2 * i,
-        }
-    }
-
     /// The block of the carrier's displacements; the block of its rotation follows.
     const fn carrier_block(&self) -> usize {
-        self.block_of(N)
+        self.blocks.of(N)
     }
 
     fn add(&self, weights: Weights, out: &mut ElementSystem<T>) {
@@ -340,10 +322,13 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
 
     /// Shows the forces on node `i` for the factor N_i (or its derivative).
     fn node_forces(&self, i: usize, factor: T, force: Vec3<T>, moment: Vec3<T>, mut show: impl FnMut(usize, Vec3<T>)) {
-        show(self.block_of(i), -(self.carrier.rotation.r * force) * factor);
+        show(self.blocks.of(i), -(self.carrier.rotation.r * force) * factor);
         if let Some(turned) = self.turned {
             let material = turned.rotations[i].transpose_mul(moment);
-            show(self.block_of(i) + 1, turned.nodes[i].rotation.t.transpose_mul(material) * (factor * self.law.radius));
+            show(
+                self.blocks.of(i) + 1,
+                turned.nodes[i].rotation.t.transpose_mul(material) * (factor * self.law.radius),
+            );
         }
     }
 
@@ -351,9 +336,9 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
     fn add_columns(&self, force: &Derived<T>, moment: &Derived<T>, weights: Weights, out: &mut ElementSystem<T>) {
         let mut displacements = [(self.carrier_block(), -T::one()); MAX_NODES + 1];
         for i in 0..N {
-            displacements[i] = (self.block_of(i), self.shape.values[i]);
+            displacements[i] = (self.blocks.of(i), self.shape.values[i]);
             if let Some(column) = self.node_rotation(i, weights) {
-                self.add_column(&[(self.block_of(i) + 1, T::one())], &column, force, moment, out);
+                self.add_column(&[(self.blocks.of(i) + 1, T::one())], &column, force, moment, out);
             }
         }
         let count = if self.carrier.is_node { N + 1 } else { N };
@@ -417,14 +402,14 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let mut add =
             |row: usize, of_row: Mat3<T>| blocks.iter().for_each(|&(block, f)| out.add_tangent(row, block, of_row * f));
         for i in 0..N {
-            add(self.block_of(i), -spatial * self.shape.values[i]);
+            add(self.blocks.of(i), -spatial * self.shape.values[i]);
         }
         if let Some(turned) = self.turned {
             let d_moment = moment.over(column);
             for i in 0..N {
                 let factor = self.shape.values[i] * self.law.radius;
                 let material = turned.rotations[i].transpose_matmul(d_moment);
-                add(self.block_of(i) + 1, turned.nodes[i].rotation.t.transpose_matmul(material) * factor);
+                add(self.blocks.of(i) + 1, turned.nodes[i].rotation.t.transpose_matmul(material) * factor);
             }
         }
         if self.carrier.is_node {
@@ -441,7 +426,7 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         if self.carrier.is_node {
             let turned = carrier.r * Mat3::skew_mul(force.value, carrier.t.scale(weight));
             for i in 0..N {
-                out.add_tangent(self.block_of(i), self.carrier_block() + 1, turned * self.shape.values[i]);
+                out.add_tangent(self.blocks.of(i), self.carrier_block() + 1, turned * self.shape.values[i]);
             }
             out.add_tangent(self.carrier_block(), self.carrier_block() + 1, -turned);
             let about = carrier.c2(self.arm().cross(force.value)).scale(weight);
@@ -455,9 +440,13 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
             let s = &turned.rotations[i];
             let back = node.t.transpose() * s.transpose() * factor;
             let own = back * Mat3::skew_mul(m, *s * node.t) + node.c2(s.transpose_mul(m)) * factor;
-            out.add_tangent(self.block_of(i) + 1, self.block_of(i) + 1, own);
+            out.add_tangent(self.blocks.of(i) + 1, self.blocks.of(i) + 1, own);
             if self.carrier.is_node {
-                out.add_tangent(self.block_of(i) + 1, self.carrier_block() + 1, -(back * Mat3::skew_mul(m, carrier.t)));
+                out.add_tangent(
+                    self.blocks.of(i) + 1,
+                    self.carrier_block() + 1,
+                    -(back * Mat3::skew_mul(m, carrier.t)),
+                );
             }
         }
     }
@@ -478,7 +467,7 @@ impl<const N: usize, T: Real> Point<'_, N, T> {
         let mut count = 0;
         for i in 0..N {
             let f_sq = *q * (bent * self.shape.values[i] + n * self.shape.slopes[i]);
-            columns[count] = (self.block_of(i), f_sq * factor);
+            columns[count] = (self.blocks.of(i), f_sq * factor);
             count += 1;
         }
         if self.carrier.is_node {

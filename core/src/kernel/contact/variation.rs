@@ -46,6 +46,36 @@ pub struct NodeTurning<T = f64> {
     pub(crate) before: NodeBefore,
 }
 
+/// The blocks of a node in the system of a contact point: all points of a contact have the same, also those without
+/// friction of a contact whose coefficient is zero at one end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NodeBlocks {
+    /// Its displacements
+    Place,
+    /// Its displacements, and its rotation
+    PlaceAndRotation,
+}
+
+impl NodeBlocks {
+    /// Those of a contact with friction, or without.
+    pub const fn with(friction: bool) -> Self {
+        if friction { Self::PlaceAndRotation } else { Self::Place }
+    }
+
+    /// The number of blocks of a node.
+    pub const fn count(self) -> usize {
+        match self {
+            Self::Place => 1,
+            Self::PlaceAndRotation => 2,
+        }
+    }
+
+    /// The block of the displacements of node `i`; that of its rotation follows.
+    pub const fn of(self, i: usize) -> usize {
+        i * self.count()
+    }
+}
+
 /// Rotations of the nodes as the carrier sees them, for friction.
 pub(super) struct Turned<'a, const N: usize, T> {
     /// R_i, T_i and S0_i

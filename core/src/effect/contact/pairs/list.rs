@@ -16,17 +16,22 @@ use crate::tensor::Vec3;
 use std::sync::Arc;
 
 /// The margin of a list, over the largest radius.
-const MARGIN_OF_RADIUS: f64 = 2.0;
+const MARGIN_OF_RADIUS: f64 = 0.3;
 
 /// The margin of a list, over the longest element.
 const MARGIN_OF_ELEMENT: f64 = 0.1;
 
-/// The margin of a list, over the largest motion in the last step.
-const MARGIN_OF_MOTION: f64 = 2.5;
+/// How many times the approach of a pair in the last step it may be apart beyond the margin and be in the list: it may
+/// touch in the next one.
+const STEPS_AHEAD: f64 = 2.5;
 
-/// Fast motions make the margin larger by this factor at most: pairs that are missed are added, and the step taken
-/// again, which costs less than the places of many pairs in the tangent.
-const LARGEST_MARGIN: f64 = 2.0;
+/// Pairs whose gap is larger than this number of margins are in no list, however fast they come: pairs that are missed
+/// are added, and the step taken again, which costs less than the places of many pairs in the tangent.
+const LARGEST_MARGIN: f64 = 12.0;
+
+/// A pair stays in the list up to this number of times the gap at which it comes into it: a new list takes a new pattern
+/// of the tangent.
+const KEPT: f64 = 1.5;
 
 /// A list is made anew when a node has moved by this part of the margin.
 const OLD: f64 = 0.25;
@@ -39,7 +44,7 @@ impl BeamPairs {
     pub(in crate::effect::contact) fn list(&self, at: &State) -> PairsMemory {
         let places = self.places(at);
         let margin = self.margin();
-        let list = self.near(&places, margin);
+        let list = self.near(&places, margin, &|_, gap| gap <= margin);
         PairsMemory {
             directions: Arc::new(self.directions_of(&list, &places)),
             accepted: Arc::new(if list.is_empty() { Vec::new() } else { places.clone() }),
@@ -56,10 +61,17 @@ impl BeamPairs {
     pub(super) fn renew_list(&self, before: &State, memory: &mut PairsMemory, at: &State) {
         let places = self.places(at);
         if farthest(&places, &memory.places) > OLD * memory.margin {
-            let step = farthest(&places, &self.places(before));
+            let before = self.places(before);
             let margin = self.margin();
-            let margin = (MARGIN_OF_MOTION * step).clamp(margin, LARGEST_MARGIN * margin);
-            let list = self.near(&places, margin);
+            // Both elements of a pair may move.
+            let fastest = 2.0 * STEPS_AHEAD * farthest(&places, &before);
+            let reach = (KEPT * (margin + fastest)).min(LARGEST_MARGIN * margin);
+            let list = self.near(&places, reach, &|pair, gap| {
+                let is_listed = memory.list.binary_search(pair).is_ok();
+                let approach = (self.chord_gap(pair, &before) - gap).max(0.0);
+                let limit = margin + STEPS_AHEAD * approach;
+                gap <= if is_listed { KEPT * limit } else { limit }
+            });
             if list != *memory.list {
                 memory.list = Arc::new(list);
             }
@@ -113,13 +125,14 @@ impl BeamPairs {
         self.strands.iter().map(of_strand).fold(0.0, f64::max)
     }
 
-    /// All pairs whose surfaces are nearer than a margin.
-    fn near(&self, places: &[Vec3], margin: f64) -> Vec<ListedPair> {
+    /// The pairs whose surfaces are nearer than `reach` and for which `is_near` holds, which is shown their gap.
+    fn near(&self, places: &[Vec3], reach: f64, is_near: &dyn Fn(&ListedPair, f64) -> bool) -> Vec<ListedPair> {
         let mut list = Vec::new();
         let mut balls = self.swept(places, places);
-        balls.iter_mut().for_each(|ball| ball.reach += 0.5 * margin);
+        balls.iter_mut().for_each(|ball| ball.reach += 0.5 * reach);
         self.each_near(&balls, &mut |pair| {
-            if self.chord_gap(&pair, places) <= margin {
+            let gap = self.chord_gap(&pair, places);
+            if gap <= reach && is_near(&pair, gap) {
                 list.push(pair);
             }
         });
@@ -145,7 +158,7 @@ impl BeamPairs {
         let size = farthest(&places, &vec![places[0]; places.len()]);
         let mut margin = 2.0 * self.margin();
         loop {
-            let gap = least(&self.near(&places, margin));
+            let gap = least(&self.near(&places, margin, &|_, _| true));
             if gap <= margin || margin > 4.0 * size {
                 return gap;
             }

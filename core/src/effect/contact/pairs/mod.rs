@@ -15,6 +15,7 @@ mod sharing;
 pub(super) use role::PairRole;
 
 use super::strand::{ChainNode, Strand};
+use crate::kernel::contact::NodeBlocks;
 use crate::system::{ListedPair, Slot, State};
 use crate::tensor::Vec3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -166,10 +167,10 @@ impl BeamPairs {
         self.meetings[meeting].strands.map(|strand| &self.strands[strand])
     }
 
-    /// The slots that a pair of elements couples: displacement and rotation of each node.
-    pub(super) fn slots(&self, pair: &ListedPair) -> impl Iterator<Item = Slot> {
+    /// The slots that a pair of elements couples: those of the blocks of each node.
+    pub(super) fn slots(&self, pair: &ListedPair, blocks: NodeBlocks) -> impl Iterator<Item = Slot> {
         let [a, b] = self.nodes_of(pair);
-        a.iter().chain(b).flat_map(|node| [node.node.u, node.node.p])
+        a.iter().chain(b).flat_map(move |node| node.slots(blocks))
     }
 
     /// The nodes of both elements of a pair.

@@ -148,7 +148,7 @@ impl<'a> PairsNow<'a> {
         let found = self.found(first, group, self.reach(known, laws));
         let all = self.predecessors(&found, known, laws);
         let orders = self.pairs.both(group[0].meeting as usize).map(|strand| strand.order);
-        let mut system = ElementSystem::new(2 * (orders[0] + orders[1] + 2));
+        let mut system = ElementSystem::new(laws.blocks_of_node().of(orders[0] + orders[1] + 2));
         for (&Found { number, candidate }, predecessors) in found.iter().zip(all) {
             let partner = predecessors.own.map(|own| &known[own]);
             let carried = predecessors.traction(candidate.weight, &|own| &known[own].point);
@@ -287,9 +287,13 @@ impl<'a> PairsNow<'a> {
         let normal = laws.normal_law(multiplier, offset, &stiffness, contacts);
         let [a, b] = self.pairs.both(pair.meeting as usize);
         let friction = self.friction(pair, candidate, laws);
-        let carrier = if friction.is_some() { self.carrier(pair, *partner) } else { 0 };
-        let carried =
-            if friction.is_some() { self.on_carrier(pair, carrier, part.carried) } else { CarriedTraction::default() };
+        let (carrier, carried) = match friction {
+            None => (0, CarriedTraction::default()),
+            Some(_) => {
+                let carrier = self.carrier(pair, *partner);
+                (carrier, self.on_carrier(pair, carrier, part.carried))
+            }
+        };
         PairLaw {
             radii: [a.radius, b.radius],
             normal,
@@ -315,7 +319,8 @@ impl<'a> PairsNow<'a> {
         let mut shapes = [[0.0; 4]; 2];
         shapes[0][..NA].copy_from_slice(&a.shape.values);
         shapes[1][..NB].copy_from_slice(&b.shape.values);
-        let carrier = b.turning.map_or(Mat3::IDENTITY, |turning| turning[law.carrier].rotation.r);
+        let turning = law.friction.and(b.turning.as_ref());
+        let carrier = turning.map_or(Mat3::IDENTITY, |turning| turning[law.carrier].rotation.r);
         let place = a.place();
         Some(PairPoint {
             number,
@@ -344,8 +349,13 @@ impl<'a> PairsNow<'a> {
             let before = self.before(pair, law.carrier, [side, i]);
             NodeTurning { rotation: self.at.rotation(nodes[i].node.p), before }
         };
-        let turning = law.friction.map(|_| std::array::from_fn(turning));
+        let turning = self.rubs(pair).then(|| std::array::from_fn(turning));
         PairSide { nodes: std::array::from_fn(node), turning, shape: ShapeAt::new(at) }
+    }
+
+    /// True if the contact of a pair has friction somewhere.
+    fn rubs(&self, pair: &ListedPair) -> bool {
+        self.laws[self.pairs.contact_of(pair.meeting as usize)].rubs()
     }
 
     /// The memory of a point with a force. Before a state is accepted, traction and normal remain

@@ -31,7 +31,7 @@ impl<'a> PairRole<'a> {
         self.now(at).each_point(Weights::NONE, &mut |point, _| visit(point));
     }
 
-    pub(super) fn law_of(self, meeting: u32) -> &'a ContactLaws {
+    pub(in crate::effect::contact) fn law_of(self, meeting: u32) -> &'a ContactLaws {
         &self.laws[self.pairs.contact_of(meeting as usize)]
     }
 

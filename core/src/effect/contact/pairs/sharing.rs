@@ -153,6 +153,9 @@ impl PairsNow<'_> {
     fn kinds_of(&self, pair: &ListedPair) -> Kinds {
         let directions = self.pairs.elements_of(pair).map(|of| self.pairs.of_element(of, &self.directions));
         let middles = directions.map(|nodes| nodes.iter().fold(Vec3::ZERO, |sum, node| sum + *node));
+        if let Some(kinds) = self.plain_kinds(pair, directions, middles) {
+            return kinds;
+        }
         let spread = |side: usize| directions[side].iter().map(|node| angle(*node, middles[side])).fold(0.0, f64::max);
         let spreads = spread(0) + spread(1);
         let middle = angle_of_lines(middles[0], middles[1]);
@@ -165,6 +168,24 @@ impl PairsNow<'_> {
             closest: self.part_of_closest(pair, middle + spreads, sine(middle + spreads)) > 0.0,
             nodes: self.part_of_closest(pair, middle - spreads, least_sine) < 1.0,
         }
+    }
+
+    /// The kinds of points of a pair of which bounds of the angles tell that it is side by side, or crosses.
+    fn plain_kinds(&self, pair: &ListedPair, directions: [&[Vec3]; 2], middles: [Vec3; 2]) -> Option<Kinds> {
+        let tangent = |a: Vec3, b: Vec3, cosine: f64| a.cross(b).norm() / cosine;
+        // An angle is not larger than its tangent.
+        let spread = |side: usize| {
+            let of_node = |node: &Vec3| tangent(*node, middles[side], node.dot(middles[side]));
+            directions[side].iter().map(of_node).try_fold(0.0, |most, t| (t >= 0.0).then_some(f64::max(most, t)))
+        };
+        let spreads = spread(0)? + spread(1)?;
+        let middle = tangent(middles[0], middles[1], middles[0].dot(middles[1]).abs());
+        if self.part_of_closest(pair, middle + spreads, middle + spreads) == 0.0 {
+            return Some(Kinds { closest: false, nodes: true });
+        }
+        // Nor smaller than 3 t/(1 + 2 sqrt(1 + t^2)).
+        let least = 3.0 * middle / (1.0 + 2.0 * (1.0 + middle * middle).sqrt());
+        (least - spreads >= CROSSING).then_some(Kinds { closest: true, nodes: false })
     }
 
     /// The part of the force of a candidate of its kind. Penalties share the force of the same gap.
