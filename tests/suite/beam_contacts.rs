@@ -820,3 +820,52 @@ fn contacts_between_unlike_elements_are_held_in_modal_stages() {
         assert!(warned.is_empty(), "{warned:?}");
     }
 }
+
+/// Two leaves with one clamped end each, of which the upper one is pressed onto the lower, shorter one: they touch at
+/// its tip, with the force P (3L - l)/(2l) B2/(B1 + B2) (beams of Euler and Bernoulli with the bending stiffness B). The
+/// tip moves by a thousandth to a third of the radius, so that a penetration of a thousandth of it would be seen.
+#[test]
+fn leaves_share_their_load_however_little_they_bend() {
+    let mut random = Random::new(86);
+    let mut worst = 0.0f64;
+    for _ in 0..20 {
+        let [length_unit, force_unit] = [0; 2].map(|_| 10f64.powf(random.range(-3.0, 3.0)));
+        let short = random.range(0.4, 0.8);
+        let bending = [0; 2].map(|_| random.range(0.5, 2.0));
+        let radius = 0.01;
+        let force = 3.0 * bending[0] * radius * 10f64.powf(random.range(-3.0, -0.5));
+        let section = |k: usize| {
+            let [stiff, bend] = [1e6 * force_unit, bending[k] * force_unit * length_unit * length_unit];
+            format!("[section.s{k}]\nEA = {stiff}\nGA = {stiff}\nGJ = {bend}\nEI = {bend}\n")
+        };
+        let leaf = |k: usize, length: f64| {
+            let height = -2.0 * radius * length_unit * k as f64;
+            format!(
+                "[[beam]]\nname = \"b{k}\"\nsection = \"s{k}\"\nthrough = [[0, 0, {height}], [{}, 0, {height}]]\nelements = 20\n\
+                 order = 2\n[[support]]\nat = \"b{k}@start\"\nfix = \"all\"\n",
+                length * length_unit
+            )
+        };
+        let text = section(0)
+            + &section(1)
+            + &leaf(0, 1.0)
+            + &leaf(1, short)
+            + &format!(
+                "[[load]]\nat = \"b0@end\"\nforce = [0, 0, {}]\n[[contact]]\nname = \"c\"\nbeams = [\"b0\"]\nwith = [\"b1\"]\n\
+                 radius = {}\n[[stage]]\nkind = \"static\"\nsteps = {}\n\
+                 [output]\nnodes = [\"b0@end\", \"b1@start\"]\ncolumns = [\"u\", \"reaction\"]\n",
+                -force * force_unit,
+                radius * length_unit,
+                random.range(1.0, 3.99).floor()
+            );
+        let simulation = simulate(&text);
+        let between = force * (3.0 - short) / (2.0 * short) * bending[1] / (bending[0] + bending[1]);
+        let tip = -(force / 3.0 - between * short * short * (3.0 - short) / 6.0) / bending[0];
+        let off = |found: f64, exact: f64| (found / exact - 1.0).abs();
+        let of_tip = off(simulation.end("b0@end.uz") / length_unit, tip);
+        let of_root = off(simulation.end("b1@start.my") / (length_unit * force_unit), -between * short);
+        worst = worst.max(of_tip).max(of_root);
+        assert!(of_tip.max(of_root) < 1e-3, "{of_tip} {of_root}\n{text}");
+    }
+    println!("largest error: {worst:e}");
+}

@@ -2,6 +2,7 @@
 
 use crate::random::Random;
 use crate::scenes::{distance, list, simulate};
+use beamsim::scene;
 use beamsim_core::tensor::Vec3;
 use beamsim_core::warning::WarningKind;
 
@@ -231,4 +232,26 @@ fn motions_and_supports_that_begin_together_are_told_apart() {
     // A node at rest is moved smoothly.
     let (messages, _) = told(&text("[0, 0, 0]", "[2]", "(t - 0.1)^2", ""));
     assert!(messages.is_empty(), "{messages:?}");
+}
+
+/// A driven slider goes on with the velocity that initial motions give its node beside that of the beam.
+#[test]
+fn drives_of_sliders_go_on_with_initial_velocities() {
+    for (velocity, of_beam, is_told) in [(0.4, 0.0, false), (0.9, 0.5, false), (0.4, 0.5, true), (0.0, 0.0, true)] {
+        let text = format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\nm = [0.1, 0, 0]\n[section.s]\nEA = 1e4\nGA = 1e3\nGJ = 1\nEI = 1\nrhoA = 1\n\
+             rhoJ = [0.02, 0.01, 0.01]\n[[beam]]\nname = \"q\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 4\n\
+             [[body]]\nat = \"m\"\nmass = 0.2\n[[slider]]\nnodes = [\"m\"]\non = \"q\"\ndisplacement = 0.8\nhistory = \"h\"\n\
+             [history.h]\nexpr = \"t/2\"\n[[initial]]\nat = \"m\"\nvelocity = [{velocity}, 0, 0]\n\
+             [[initial]]\nbeam = \"q\"\nvelocity = [{of_beam}, 0, 0]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.01\nscheme = \"generalized_alpha\"\n\
+             [output]\nnodes = [\"m\"]\ncolumns = [\"v\"]\n"
+        );
+        let (_, diagnostics) = scene::from_text(&text).unwrap_or_else(|e| panic!("{e:?}"));
+        assert_eq!(
+            format!("{diagnostics:?}").contains("VelocityJump"),
+            is_told,
+            "{velocity} {of_beam}: {diagnostics:?}"
+        );
+    }
 }

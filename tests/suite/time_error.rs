@@ -560,3 +560,35 @@ fn rotations_without_inertia_have_no_error_of_their_own() {
     assert!(estimated(&run).rotation < 0.1, "{:?}", estimated(&run));
     assert!(!doubts(&run).contains(&WarningKind::LongSteps), "{:?}", doubts(&run));
 }
+
+/// Where nothing restores what a load moves, the first slope of the force leaves an error that grows for the whole
+/// stage: a free mass, or one on a hinge, under a load that swings from a phase of its own.
+#[test]
+fn errors_of_loads_that_swing_what_is_free_are_known() {
+    let mut random = Random::new(77);
+    let mut ratios = [f64::INFINITY, 0.0];
+    for case in 0..40 {
+        let scheme = ["newmark", "generalized_alpha", "hht", "lie_generalized_alpha", "lobatto"][case % 5];
+        let (rate, phase) = (random.range(0.15, 0.45), random.range(0.0, PI));
+        let steps = random.range(40.0, 400.0).floor();
+        let what = if case % 2 == 0 { ("force", "u") } else { ("moment", "r") };
+        let text = format!(
+            "[point]\np = [0, 0, 0]\n[[body]]\nat = \"p\"\nmass = 1\ninertia = [1, 1, 1]\n\
+             [[load]]\nat = \"p\"\n{} = [0.001, 0, 0]\nhistory = \"h\"\n[history.h]\nexpr = \"sin({rate}*t + {phase})\"\n\
+             [output]\nnodes = [\"p\"]\ncolumns = [\"{}\"]\n[[stage]]\nkind = \"dynamic\"\nend = {steps}\nstep = 1\n\
+             scheme = \"{scheme}\"\n",
+            what.0, what.1
+        );
+        let simulation = simulate(&text);
+        let way = |k: usize| {
+            let t = k as f64;
+            0.001 * ((phase.sin() - (rate * t + phase).sin()) / rate + phase.cos() * t) / rate
+        };
+        let error = largest_difference(&simulation.column(&format!("p.{}x", what.1)), way);
+        let estimate = estimated(&simulation);
+        let ratio = (if what.0 == "force" { estimate.displacement } else { estimate.rotation }) / error;
+        ratios = [ratios[0].min(ratio), ratios[1].max(ratio)];
+        assert!((0.4..2.5).contains(&ratio), "{scheme} {what:?} {rate} {phase} {steps}: {ratio} of {error:e}");
+    }
+    println!("estimates over errors: {ratios:?}");
+}

@@ -126,6 +126,13 @@ impl Sliders {
             guide.nodes[nodes.clone()].iter().map(|node| node.place + at.q[node.u as usize]).collect();
         SliderNow { element, nodes, weights, line: LinePoint::new(&weights, &places) }
     }
+
+    /// The rates at the place of a slider on its line, from rates of all slots.
+    fn rate_of_line(&self, slider: &Slider, now: &SliderNow, rates: &[Vec3]) -> LinePoint {
+        let nodes = &self.guides[slider.guide].nodes[now.nodes.clone()];
+        let of_nodes: Vec<Vec3> = nodes.iter().map(|node| rates[node.u as usize]).collect();
+        LinePoint::new(&now.weights, &of_nodes)
+    }
 }
 
 impl Effect for Sliders {
@@ -187,12 +194,7 @@ impl Constraint for Sliders {
     fn drift(&self, at: &State, rates: &mut [Vec3], rates2: &mut [Vec3]) {
         for slider in &self.sliders {
             let now = self.now(slider, at);
-            let guide = &self.guides[slider.guide].nodes[now.nodes.clone()];
-            let line_of = |rates: &[Vec3]| {
-                let of_nodes: Vec<Vec3> = guide.iter().map(|node| rates[node.u as usize]).collect();
-                LinePoint::new(&now.weights, &of_nodes)
-            };
-            let (line, line_rate) = (line_of(&at.v), line_of(&at.a));
+            let [line, line_rate] = [&at.v, &at.a].map(|rates| self.rate_of_line(slider, &now, rates));
             let [speed, speed_rate] = [&at.v, &at.a].map(|rates| rates[slider.slide as usize].0[0]);
             let (u, force) = (slider.u as usize, slider.force as usize);
             rates[force] = at.v[u] - line.place - now.line.slope * speed;
@@ -213,6 +215,16 @@ impl Constraint for Sliders {
 
     fn held_by_ground(&self, _at: &State, _node: Node) -> (Vec3, Vec3) {
         (Vec3::ZERO, Vec3::ZERO)
+    }
+
+    fn follow_nodes(&self, at: &mut State) {
+        for slider in &self.sliders {
+            let now = self.now(slider, at);
+            let of_line = self.rate_of_line(slider, &now, &at.v);
+            let slope = now.line.slope;
+            let speed = slope.dot(at.v[slider.u as usize] - of_line.place) / slope.squared();
+            at.v[slider.slide as usize].0[0] = speed;
+        }
     }
 
     fn left(&self, at: &State) -> Option<Slot> {

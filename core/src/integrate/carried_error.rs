@@ -144,7 +144,7 @@ struct SlotError {
     /// [`StepEnds::rate_of_error`] at the ends of the last steps, each at the index of its number
     /// modulo [`SLOPE_STEPS`]
     past: [Vec3; SLOPE_STEPS],
-    /// The last slope of that rate
+    /// The last slope of that rate; before slopes are complete the one at the start
     slope: Vec3,
     /// q at the start of the stage
     start: Vec3,
@@ -614,6 +614,25 @@ struct LocalErrors {
     per_span: f64,
     /// True for the first step of its length, whose second differences do not compare with those before
     is_first: bool,
+    /// The first slope of rates, where those over several steps come late
+    start: Option<FirstSlope>,
+}
+
+/// The slope of a rate at the start of the first of two steps.
+struct FirstSlope {
+    /// The lengths of both steps
+    lengths: [f64; 2],
+}
+
+impl FirstSlope {
+    /// From the rate at the start and after each of both steps: of a parabola, or that of the first step where the rate
+    /// turns round, since a parabola would overshoot.
+    fn slope(&self, [start, middle, end]: [Vec3; 3]) -> Vec3 {
+        let [first, second] = self.lengths;
+        let [slope, next] = [(middle - start) * (1.0 / first), (end - middle) * (1.0 / second)];
+        let turns_round = slope.dot(next) < 0.0;
+        if turns_round { slope } else { slope - (next - slope) * (first / (first + second)) }
+    }
 }
 
 impl LocalErrors {
@@ -626,13 +645,15 @@ impl LocalErrors {
             Stages::End => {
                 let [steps, settling] = [SLOPE_STEPS; 2];
                 let per_span = 1.0 / span;
-                Self { factors, of_apparent: 0.0, length, steps, settling, place, per_span, is_first: false }
+                let start = Some(FirstSlope { lengths: [before, length] });
+                Self { factors, of_apparent: 0.0, length, steps, settling, place, per_span, is_first: false, start }
             }
             // Such steps are long: slopes over several would miss much of the motion.
             Stages::MiddleAndEnd => {
                 let of_apparent = 1.25 * LOBATTO_ERROR * length.powi(4);
                 let is_first = length != before;
-                Self { factors, of_apparent, length, steps: 1, settling: 2, place, per_span: 1.0 / length, is_first }
+                let per_span = 1.0 / length;
+                Self { factors, of_apparent, length, steps: 1, settling: 2, place, per_span, is_first, start: None }
             }
         }
     }
@@ -673,10 +694,22 @@ impl LocalErrors {
             slot.past = [before; SLOPE_STEPS];
         }
         let slope = (after - slot.past[self.earlier(self.steps)]) * self.per_span;
-        let change = if usize::from(slot.age) < self.settling { Vec3::ZERO } else { slope - slot.slope };
+        let age = usize::from(slot.age);
+        // A change that is missed at the start moves what nothing holds for the whole stage.
+        let change = match self.start {
+            Some(_) if age + 1 >= self.settling => slope - slot.slope,
+            // The first one stands for the one before it, too.
+            None if age == self.settling => (slope - slot.slope) * 2.0,
+            None if age > self.settling => slope - slot.slope,
+            Some(_) | None => Vec3::ZERO,
+        };
+        slot.slope = match &self.start {
+            Some(start) if age == 1 => start.slope([slot.past[self.earlier(2)], before, after]),
+            Some(_) if age > 1 && age + 1 < self.settling => slot.slope,
+            Some(_) | None => slope,
+        };
         slot.age = (SLOPE_STEPS as u8).min(slot.age + 1);
         slot.past[self.place] = after;
-        slot.slope = slope;
         slot.apparent = [after + slope * self.length, slope].map(|rate| rate * self.of_apparent);
         let [of_place, of_rate, of_change] = self.factors;
         [slope * of_place, slope * of_rate + change * of_change]

@@ -197,6 +197,7 @@ impl<'p> Rehearser<'p> {
         if begins {
             self.state.stand_still();
             self.initial.iter().for_each(|motion| motion.give_to(&mut self.state));
+            self.model.constraints().for_each(|constraint| constraint.follow_nodes(&mut self.state));
         }
         let given = self.state.v.clone();
         self.schedule.set_clock(self.model, &mut self.state, clock, 1.0);

@@ -22,6 +22,10 @@ use beamsim_core::tensor::Vec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+/// The smallest value of the largest penetration of contacts that name none, which follows motions, over that of the
+/// radius.
+const LEAST_PENETRATION: f64 = 1e-3;
+
 /// The largest penetration of contacts that name none, over the radius.
 const PENETRATION: f64 = 1e-3;
 
@@ -179,12 +183,15 @@ impl Composer<'_> {
 
     /// The laws of a contact whose thinnest party has this radius.
     fn laws_of(&mut self, contact: &deck::Contact, radius: f64) -> ContactLaws {
-        let penetration = contact.penetration.unwrap_or(PENETRATION * radius);
+        let of_radius = PENETRATION * radius;
+        let of_radius = if of_radius.is_finite() { of_radius } else { 1.0 };
+        let penetration = contact.penetration.unwrap_or(of_radius);
         ContactLaws {
             name: contact.name.value.clone(),
             friction: contact.friction,
             stick: contact.stick,
-            penetration: if penetration.is_finite() { penetration } else { 1.0 },
+            penetration,
+            least_penetration: contact.penetration.unwrap_or(LEAST_PENETRATION * of_radius),
             damping: match contact.damping {
                 ContactDamping::Factor(damping) => damping,
                 ContactDamping::Restitution { restitution, speed } => {

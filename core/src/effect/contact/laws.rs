@@ -3,6 +3,9 @@
 use crate::kernel::contact::{CarriedTraction, FrictionLaw, NodeBlocks, NormalLaw, PointState, Status};
 use crate::system::{ContactMemory, ContactRegime, ContactStiffness};
 
+/// The largest penetration of balanced states over the way of the nodes in contact.
+const TOLERANCE_OF_WAY: f64 = 1e-3;
+
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
 
@@ -33,6 +36,9 @@ pub struct ContactLaws {
     pub stick: f64,
     /// The largest penetration, a length
     pub penetration: f64,
+    /// The smallest value to which the largest penetration of a balanced state goes down with small motions; that
+    /// itself where the deck has it
+    pub least_penetration: f64,
     /// c of the penalty, time per length
     pub damping: f64,
     /// The index of its amplitude, which is 0 in stages without it and otherwise 1
@@ -40,6 +46,12 @@ pub struct ContactLaws {
 }
 
 impl ContactLaws {
+    /// The largest penetration in a balanced state in which no node of a contact has moved by more than `way`: next to
+    /// motions it is small.
+    pub(super) fn tolerance(&self, way: f64) -> f64 {
+        (TOLERANCE_OF_WAY * way).clamp(self.least_penetration, self.penetration)
+    }
+
     /// The memory of friction at an accepted point of a contact whose first stiffness is `first`. A
     /// point that barely touches has none: the direction of its traction is that of round-off.
     pub(super) fn carried(&self, has_friction: bool, first: f64, state: &PointState) -> CarriedTraction {

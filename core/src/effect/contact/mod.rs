@@ -78,6 +78,13 @@ impl SurfaceContacts {
         beams.flat_map(|strand| strand.nodes.iter().map(|at| at.node))
     }
 
+    /// How far a node that may touch something has moved at most since the start of the run.
+    fn way(&self, at: &State) -> f64 {
+        let strands = self.chains.iter().map(|chain| &chain.strand).chain(self.pairs.strands());
+        let moved = strands.flat_map(|strand| &strand.nodes).map(|at_node| at.q[at_node.node.u as usize].squared());
+        moved.fold(0.0, f64::max).sqrt()
+    }
+
     /// Chains whose contact acts in a state, with its laws and the surface.
     fn acting<'a>(&'a self, at: &'a State) -> impl Iterator<Item = (&'a Chain, &'a ContactLaws, &'a SceneSurface)> {
         let with_parts = |chain: &'a Chain| (chain, &self.laws[chain.contact], &self.surfaces[chain.surface]);
@@ -466,6 +473,7 @@ impl Contacts for SurfaceContacts {
     fn survey(&self, at: &State) -> ContactSurvey {
         let mut out = ContactSurvey::default();
         let mut largest_force = 0.0f64;
+        let way = self.way(at);
         // Of each point the force, the gap, that over what is allowed, and a slot.
         let mut points = Vec::new();
         self.each_chain(at, Weights::NONE, &mut |_, chain| {
@@ -475,7 +483,7 @@ impl Contacts for SurfaceContacts {
                 out.points += usize::from(force > 0.0);
                 out.work_in_penetration += force * chain.laws.penetration;
                 if gap < 0.0 || force > 0.0 {
-                    points.push((force, gap, gap.abs() / chain.laws.penetration, chain.slot_of(point.candidate)));
+                    points.push((force, gap, gap.abs() / chain.laws.tolerance(way), chain.slot_of(point.candidate)));
                 }
             });
         });
@@ -485,7 +493,7 @@ impl Contacts for SurfaceContacts {
                 (out.violation, out.gap, out.slot) = (violation, gap, slot);
             }
         }
-        self.pairs().survey(at, &mut out);
+        self.pairs().survey(at, way, &mut out);
         out
     }
 

@@ -104,8 +104,8 @@ impl<'a> PairRole<'a> {
         at.contacts.pairs.points = Arc::new(self.now(at).holding_points());
     }
 
-    /// Adds to what was found of other contacts in a balanced state.
-    pub fn survey(self, at: &State, out: &mut ContactSurvey) {
+    /// Adds to what was found of other contacts in a balanced state, whose nodes have moved by up to `way`.
+    pub fn survey(self, at: &State, way: f64, out: &mut ContactSurvey) {
         let mut largest = 0.0f64;
         self.each(at, &mut |point| largest = largest.max(point.state.normal_force.force));
         self.each(at, &mut |point| {
@@ -114,7 +114,7 @@ impl<'a> PairRole<'a> {
             out.points += usize::from(force > 0.0);
             out.work_in_penetration += point.candidate.weight * force * self.law_of(point.pair.meeting).penetration;
             let is_relevant = gap < 0.0 || force > RELEVANT_FORCE * largest;
-            let violation = gap.abs() / self.law_of(point.pair.meeting).penetration;
+            let violation = gap.abs() / self.law_of(point.pair.meeting).tolerance(way);
             if is_relevant && violation > out.violation {
                 *out = ContactSurvey { violation, gap, slot: self.slot_of(&point.pair), ..*out };
             }
