@@ -456,7 +456,7 @@ fn beams_that_begin_inside_each_other_are_refused() {
     let simulation = attempt(&pushed(&first, &inside, normal * -0.1, 2));
     let failure = simulation.result.unwrap_err();
     assert_eq!(failure.kind(), FailureKind::ContactStart);
-    assert!(failure.to_string().contains("inside \"second\""), "{failure}");
+    assert!(failure.to_string().contains("into \"second\""), "{failure}");
 }
 
 /// Two beams in line whose ends, nodes of their own at one place, a joint connects.

@@ -1,7 +1,7 @@
 //! Contact with surfaces in whole scenes.
 
 use crate::random::Random;
-use crate::scenes::{Simulation, attempt, list, refusal, simulate};
+use crate::scenes::{Simulation, attempt, list, refusal, simulate, warnings};
 use beamsim_core::failure::FailureKind;
 use beamsim_core::tensor::Vec3;
 use beamsim_core::warning::WarningKind;
@@ -1797,5 +1797,31 @@ fn a_ball_that_is_carried_round_rolls_in_any_levels() {
             let (came, exact) = (simulate(&text).end("b.ry").abs(), 9.0 * std::f64::consts::FRAC_PI_2);
             assert!((came / exact - 1.0).abs() < 3e-3, "{came} for {exact}\n{text}");
         }
+    }
+}
+
+/// Tubes that part block each other; a sheath in a vessel does not, nor do tubes one after the other.
+#[test]
+fn tubes_that_part_are_told() {
+    let tube = |name: &str, through: &str, radius: f64| {
+        format!(
+            "[[surface]]\nname = \"{name}\"\nkind = \"tube\"\nside = \"inside\"\nsmooth = false\nthrough = {through}\nradius = {radius}\n"
+        )
+    };
+    let trunk = tube("a", "[[-1, 0, 0], [0, 0, 0], [0.8, 0, 0.4]]", 0.05);
+    for (other, is_told) in [
+        (tube("b", "[[-1, 0, 0], [0, 0, 0], [0.8, 0, -0.4]]", 0.05), true),
+        (tube("b", "[[0, 0, 0], [0.8, 0, -0.4]]", 0.05), true),
+        (tube("b", "[[-1, 0, 0], [0, 0, 0.02], [0.8, 0, 0.4]]", 0.03), false),
+        (tube("b", "[[0.8, 0, 0.4], [1.6, 0, 0.8]]", 0.05), false),
+    ] {
+        let text = format!(
+            "[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e-3\nEI = 1e-3\n[[beam]]\nname = \"w\"\nsection = \"s\"\n\
+             through = [[-0.9, 0, 0], [-0.3, 0, 0]]\nelements = 8\n[[support]]\nat = \"w@start\"\nfix = \"all\"\n{trunk}{other}\
+             [[contact]]\nname = \"k\"\nbeams = [\"w\"]\nsurfaces = [\"a\", \"b\"]\nradius = 0.01\n\
+             [[stage]]\nkind = \"static\"\nsteps = 1\n"
+        );
+        let told = warnings(&text);
+        assert_eq!(told.iter().any(|message| message.contains("neither branch")), is_told, "{told:?}\n{other}");
     }
 }

@@ -330,8 +330,8 @@ impl fmt::Display for Failure {
             ),
             Self::ContactStart { at, contact, surface, node, depth } => write!(
                 f,
-                "contact \"{contact}\" begins with a penetration: node \"{node}\" is {depth:.3e} inside \
-                 \"{surface}\" ({at})"
+                "contact \"{contact}\" begins with a penetration of {depth:.3e} into \"{surface}\" near node \"{node}\" \
+                 ({at})"
             ),
             Self::ContactPassed { at, node } => write!(
                 f,

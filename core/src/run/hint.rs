@@ -37,7 +37,8 @@ impl Failure {
             }
             Self::ContactStart { .. } => Some(
                 "move the surface or the beam apart (the radius of the contact counts), or allow a larger `penetration`; \
-                 a surface that is to hold the beam within it takes `side = \"inside\"`"
+                 a beam with nodes on a curved surface is inside of it between them (more `elements`, an arc); a surface \
+                 that is to hold the beam within it takes `side = \"inside\"`"
                     .into(),
             ),
             Self::SliderEnd { .. } => Some(

@@ -19,6 +19,7 @@ use beamsim_core::model::Amplitude;
 use beamsim_core::run::Driven;
 use beamsim_core::system::{ContactStiffness, Slot};
 use beamsim_core::tensor::Vec3;
+use beamsim_core::warning::WarningKind;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -178,7 +179,36 @@ impl Composer<'_> {
                 out.chains.push(Chain { surface, strand: party.clone() });
             }
         }
+        self.warn_of_blocked_tubes(contact, surfaces, radius);
         self.add_meetings(contact, parties, with, pairs);
+    }
+
+    /// Tubes that part: a beam that must stay within both goes into neither branch.
+    fn warn_of_blocked_tubes(&mut self, contact: &deck::Contact, surfaces: &[Option<SceneSurface>], radius: f64) {
+        let named = |name: &Spanned<String>| {
+            surfaces
+                .iter()
+                .flatten()
+                .find(|surface| surface.name == name.value)
+                .map(|surface| (surface, name.span.clone()))
+        };
+        let of_contact: Vec<_> = contact.surfaces.iter().filter_map(named).collect();
+        for (k, (second, span)) in of_contact.iter().enumerate() {
+            for (first, _) in &of_contact[..k] {
+                if let (Some(place), Some(_)) = (first.leaves(second, radius), second.leaves(first, radius)) {
+                    let [x, y, z] = place.0;
+                    let message = format!(
+                        "the tubes `{}` and `{}` part near [{x:.4}, {y:.4}, {z:.4}], and what touches both must stay within \
+                         both: it can go into neither branch",
+                        first.name, second.name
+                    );
+                    let help = "a vessel with branches is one surface: a closed mesh, or a [[contact]] for each branch \
+                                with its own `stages`";
+                    let warning = Diagnostic::warning(WarningKind::BlockedTubes, message, span.clone()).help(help);
+                    self.report(warning);
+                }
+            }
+        }
     }
 
     /// The laws of a contact whose thinnest party has this radius.

@@ -48,6 +48,16 @@ pub enum SurfaceCarrier {
 }
 
 impl SceneSurface {
+    /// The place at which the centre line of this tube leaves another one, if both hold what touches them within
+    /// them and stand still; `size` is a length of the order of gaps.
+    pub fn leaves(&self, other: &Self, size: f64) -> Option<Vec3> {
+        let stand_still = [self, other].iter().all(|surface| matches!(surface.carrier, SurfaceCarrier::Ground));
+        let is_outside = |place: &Vec3| other.surface.value(*place, size).is_some_and(|gap| gap < 0.0);
+        let is_tube = |surface: &Surface| !surface.centre_line_of_lumen().is_empty();
+        let may_leave = stand_still && is_tube(&other.surface);
+        self.surface.centre_line_of_lumen().into_iter().filter(|_| may_leave).find(is_outside)
+    }
+
     /// The angle of a prescribed rotation between two lists of amplitudes, in radians.
     pub(super) fn turned(&self, from: &[f64], to: &[f64]) -> f64 {
         match self.carrier {

@@ -99,6 +99,9 @@ pub enum Shape {
     Mesh(Arc<TriangleMesh>),
 }
 
+/// Parts into which pieces of a centre line are cut to look along it.
+const PARTS_OF_PIECE: usize = 16;
+
 /// A rigid surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
@@ -157,6 +160,30 @@ impl Surface {
                 let beside = steps.into_iter().find_map(|step| distance(y + ASIDE * (step * size)).ok());
                 beside.map(|distance| distance.value)
             }
+        }
+    }
+
+    /// Places along the centre line of a tube that holds points within it; none of other surfaces.
+    pub fn centre_line_of_lumen(&self) -> Vec<Vec3> {
+        match (&self.shape, self.side) {
+            (Shape::Tube(tube), Side::Inside) => {
+                let between = |ends: &[(Vec3, f64)]| {
+                    let [(from, _), (to, _)] = [ends[0], ends[1]];
+                    (0..=PARTS_OF_PIECE).map(move |k| from + (to - from) * (k as f64 / PARTS_OF_PIECE as f64))
+                };
+                tube.sections().windows(2).flat_map(between).collect()
+            }
+            (
+                Shape::Plane { .. }
+                | Shape::Sphere { .. }
+                | Shape::Cylinder { .. }
+                | Shape::Cone(_)
+                | Shape::Torus { .. }
+                | Shape::Box { .. }
+                | Shape::Tube(_)
+                | Shape::Mesh(_),
+                Side::Outside | Side::Inside,
+            ) => Vec::new(),
         }
     }
 
