@@ -23,8 +23,12 @@ pub trait Contacts {
     /// points reach the limit of friction within the allowed part of the element or the radius.
     fn needed_stick_factors(&self, at: &State) -> Vec<f64>;
 
-    /// Penetrations and changes of a balanced state.
-    fn survey(&self, at: &State) -> ContactSurvey;
+    /// How far a node that may touch something has moved at most since the start of the run.
+    fn way(&self, at: &State) -> f64;
+
+    /// Penetrations and changes of a balanced state, whose nodes have moved by up to `way`: penetrations are small next to
+    /// it.
+    fn survey(&self, at: &State, way: f64) -> ContactSurvey;
 
     /// Takes the normal forces of a balanced state as multipliers.
     fn augment(&self, at: &mut State);

@@ -117,6 +117,16 @@ pub(super) struct CarriedError {
     sums: [Largest; 2],
 }
 
+/// The largest part of the motion in a step that its local error is. That of an oscillation with five steps a period is
+/// an eighth.
+const MOST_OF_MOTION: f64 = 0.5;
+
+/// A vector, but not longer than `most`.
+fn at_most(vector: Vec3, most: f64) -> Vec3 {
+    let size = vector.norm();
+    if size > most { vector * (most / size) } else { vector }
+}
+
 /// The quantities of the present step that have been computed.
 #[derive(Clone, Copy, PartialEq, Deserialize, Serialize)]
 enum Known {
@@ -422,7 +432,8 @@ impl CarriedError {
                 if slot.moves {
                     let ends = local.rates(slot, &step_ends, k);
                     let rings = local.rings(slot, ends);
-                    let [mut of_place, mut of_rate] = local.of(slot, ends);
+                    let fastest = step_ends.from.v[k].norm().max(to.v[k].norm());
+                    let [mut of_place, mut of_rate] = local.within(fastest, local.of(slot, ends));
                     if !dof_map.is_plain(k as Slot) {
                         for error in [&mut of_place, &mut of_rate].into_iter().chain(&mut slot.apparent) {
                             *error -= dof_map.held_part(k as Slot, *error);
@@ -509,7 +520,8 @@ impl CarriedError {
                 let q = to.q[after.slot as usize];
                 let ends = [before.driven, after.driven];
                 let rings = local.rings(slot, ends);
-                let [of_place, of_rate] = local.of(slot, ends);
+                let fastest = before.spin.norm().max(after.spin.norm());
+                let [of_place, of_rate] = local.within(fastest, local.of(slot, ends));
                 let of_spin = (after.free - before.free) * (h.powi(4) * after.spin.squared() * FREE_SPIN_ERROR);
                 let back = Rotation::new(q).r.transpose();
                 // Of h^3/6 (mu' + phi') the step leaves out what moments do to phi, which is -12 lead.
@@ -681,6 +693,14 @@ impl LocalErrors {
     fn rings(&self, slot: &SlotError, [before, after]: [Vec3; 2]) -> bool {
         let earlier = slot.past[self.earlier(2)];
         slot.age > 1 && (after - before).dot(before - earlier) < 0.0
+    }
+
+    /// The local errors of a slot whose rate is not larger than `fastest`, but no more than [`MOST_OF_MOTION`] of how far
+    /// the step moves it, and of that rate. Accelerations of what is damped faster than steps resolve are far larger
+    /// than its motion.
+    fn within(&self, fastest: f64, [of_place, of_rate]: [Vec3; 2]) -> [Vec3; 2] {
+        let most = MOST_OF_MOTION * fastest;
+        [at_most(of_place, most * self.length), at_most(of_rate, most)]
     }
 
     /// The local errors tau and tau', from the rates of the error at both ends of the step.

@@ -4,11 +4,13 @@
 mod compressed_field;
 mod jet;
 mod lanes;
+mod rate;
 
 pub use compressed_field::CompressedField;
 pub use jet::Jet;
 pub use lanes::{Instructions, LANES, Lanes, Pack};
 pub(crate) use lanes::{each_lane, pack};
+pub use rate::Rate;
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 

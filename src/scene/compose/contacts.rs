@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 /// The smallest value of the largest penetration of contacts that name none, which follows motions, over that of the
 /// radius.
-const LEAST_PENETRATION: f64 = 1e-3;
+const LEAST_PENETRATION: f64 = 1e-6;
 
 /// The largest penetration of contacts that name none, over the radius.
 const PENETRATION: f64 = 1e-3;

@@ -78,13 +78,6 @@ impl SurfaceContacts {
         beams.flat_map(|strand| strand.nodes.iter().map(|at| at.node))
     }
 
-    /// How far a node that may touch something has moved at most since the start of the run.
-    fn way(&self, at: &State) -> f64 {
-        let strands = self.chains.iter().map(|chain| &chain.strand).chain(self.pairs.strands());
-        let moved = strands.flat_map(|strand| &strand.nodes).map(|at_node| at.q[at_node.node.u as usize].squared());
-        moved.fold(0.0, f64::max).sqrt()
-    }
-
     /// Chains whose contact acts in a state, with its laws and the surface.
     fn acting<'a>(&'a self, at: &'a State) -> impl Iterator<Item = (&'a Chain, &'a ContactLaws, &'a SceneSurface)> {
         let with_parts = |chain: &'a Chain| (chain, &self.laws[chain.contact], &self.surfaces[chain.surface]);
@@ -470,10 +463,15 @@ impl Contacts for SurfaceContacts {
         needed
     }
 
-    fn survey(&self, at: &State) -> ContactSurvey {
+    fn way(&self, at: &State) -> f64 {
+        let strands = self.chains.iter().map(|chain| &chain.strand).chain(self.pairs.strands());
+        let moved = strands.flat_map(|strand| &strand.nodes).map(|node| at.q[node.node.u as usize].squared());
+        moved.fold(0.0, f64::max).sqrt()
+    }
+
+    fn survey(&self, at: &State, way: f64) -> ContactSurvey {
         let mut out = ContactSurvey::default();
         let mut largest_force = 0.0f64;
-        let way = self.way(at);
         // Of each point the force, the gap, that over what is allowed, and a slot.
         let mut points = Vec::new();
         self.each_chain(at, Weights::NONE, &mut |_, chain| {

@@ -27,7 +27,7 @@ use crate::kernel::NodePlace;
 use crate::kernel::law::{Strain, Stress};
 use crate::kernel::shape::{gauss, lagrange};
 use crate::rotation::Rotation;
-use crate::scalar::Jet;
+use crate::scalar::Rate;
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -46,13 +46,13 @@ pub struct ElementStresses {
 /// An integration point.
 #[derive(Clone, Debug)]
 struct StressedPoint {
-    /// Gamma and K. Jets hold what is of first order in the displacements of a linear stage as their
+    /// Gamma and K. Rates hold what is of first order in the displacements of a linear stage as their
     /// rate, which is zero in other stages
-    strain: Strain<Jet>,
+    strain: Strain<Rate>,
     /// Elastic stress
-    elastic: Stress<Jet>,
+    elastic: Stress<Rate>,
     /// Stress of strain-rate damping
-    damping: Stress<Jet>,
+    damping: Stress<Rate>,
     /// y less Gamma: the unit tangent of the initial centre line
     tangent: Vec3,
     /// Initial length over xi
@@ -152,7 +152,7 @@ impl StressedPoint {
     /// The elastic part of a change of force and moment along the element: that of the forces, and of
     /// the moments, at this point.
     fn elastic_part(&self, change: &Vector6) -> Vector6 {
-        let part = |elastic: &Vec3<Jet>, damping: &Vec3<Jet>| {
+        let part = |elastic: &Vec3<Rate>, damping: &Vec3<Rate>| {
             let [elastic, damping] = [sum(elastic), sum(damping)];
             let total = elastic + damping;
             let square = total.squared();
@@ -166,17 +166,17 @@ impl StressedPoint {
         vector(&Stress { n: n * of_forces, m: m * of_moments })
     }
 
-    fn total(&self) -> Stress<Jet> {
+    fn total(&self) -> Stress<Rate> {
         self.elastic + self.damping
     }
 
     /// y = R^T x'
-    fn y(&self) -> Vec3<Jet> {
+    fn y(&self) -> Vec3<Rate> {
         self.strain.gamma + Vec3::constant(self.tangent)
     }
 
     /// The derivative of the moment over xi by balance.
-    fn moment_slope(&self) -> Vec3<Jet> {
+    fn moment_slope(&self) -> Vec3<Rate> {
         let Stress { n, m } = self.total();
         (m.cross(self.strain.kappa) + n.cross(self.y())).scale(self.stretch)
     }
@@ -199,7 +199,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         let change = origin.map_or([(Vec3::ZERO, Vec3::ZERO); N], |origin| {
             I::variation(member, origin, &|slot| at.q[slot as usize] - origin.q[slot as usize])
         });
-        let nodes: [NodePlace<Jet>; N] = std::array::from_fn(|i| {
+        let nodes: [NodePlace<Rate>; N] = std::array::from_fn(|i| {
             let NodePlace { u, p } = view.nodes()[i];
             NodePlace { u: with_change(u, change[i].0), p: with_change(p, change[i].1) }
         });
@@ -207,9 +207,9 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         // out.
         let free_amplitude = self.free_amplitude(at);
         let [value, rate] = if origin.is_some() { [0.0, free_amplitude] } else { [free_amplitude, 0.0] };
-        let free = Jet { value, rate, rate2: 0.0 };
+        let free = Rate { value, rate };
         let of_point = |(point, &(_, weight)): (&ElasticPoint<N>, &(f64, f64))| {
-            let (strain, elastic) = point.lifted::<Jet>().strain_and_stress(&nodes, free);
+            let (strain, elastic) = point.lifted::<Rate>().strain_and_stress(&nodes, free);
             StressedPoint {
                 strain,
                 elastic,
@@ -227,17 +227,17 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 }
 
 /// A vector with its change in a linear stage.
-fn with_change(value: Vec3, change: Vec3) -> Vec3<Jet> {
-    Vec3(std::array::from_fn(|k| Jet { value: value.0[k], rate: change.0[k], rate2: 0.0 }))
+fn with_change(value: Vec3, change: Vec3) -> Vec3<Rate> {
+    Vec3(std::array::from_fn(|k| Rate { value: value.0[k], rate: change.0[k] }))
 }
 
 /// The sum of a vector and its change.
-fn sum(vector: &Vec3<Jet>) -> Vec3 {
-    Vec3(vector.0.each_ref().map(|jet| jet.value + jet.rate))
+fn sum(vector: &Vec3<Rate>) -> Vec3 {
+    Vec3(vector.0.each_ref().map(|number| number.value + number.rate))
 }
 
 /// The sum of a stress and its change.
-fn now(stress: &Stress<Jet>) -> Vector6 {
+fn now(stress: &Stress<Rate>) -> Vector6 {
     vector(&Stress { n: sum(&stress.n), m: sum(&stress.m) })
 }
 

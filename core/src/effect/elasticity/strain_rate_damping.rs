@@ -11,7 +11,7 @@
 //!
 //! f and sum s_k G_k are force and geometric tangent of the elastic element under the stress s, for
 //! any interpolation. b_k is its force under a unit stress, and G_k qd the rate of that force: a
-//! jet along the motion gives both.
+//! number with its rate along the motion gives both.
 
 use super::beam::{BeamElasticity, StressField, find};
 use super::element::{ElasticElement, ElasticPoint, ElementNodes};
@@ -21,7 +21,7 @@ use crate::effect::{Effect, Roles, TangentForm, after_displacement, for_each_bat
 use crate::kernel::elastic::Point;
 use crate::kernel::law::{SectionLaw, Stiffness, Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
-use crate::scalar::Jet;
+use crate::scalar::Rate;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, RotationRate, State};
 use crate::tensor::{Mat3, Vec3};
 use std::cell::RefCell;
@@ -176,7 +176,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     weights: Weights,
     out: &mut Assembler,
 ) {
-    let scratch_memory = RefCell::new(DampingScratch { element: Workspace::new(N), jets: Workspace::new(N) });
+    let scratch_memory = RefCell::new(DampingScratch { element: Workspace::new(N), moving: Workspace::new(N) });
     let mut system = ElementSystem::new(2 * N);
     for (k, element) in batch.iter().enumerate() {
         let member = element.member();
@@ -210,7 +210,7 @@ impl<const G: usize> PointDamping<'_, G> {
 /// Scratch memory, kept between elements.
 struct DampingScratch {
     element: Workspace,
-    jets: Workspace<Jet>,
+    moving: Workspace<Rate>,
 }
 
 /// The configuration of an element in one chart, with the rates of its nodes.
@@ -240,12 +240,12 @@ impl<const N: usize> ElementMotion<N> {
     }
 
     /// The configuration as a function of time, to first order.
-    fn jets(&self) -> ElementConfiguration<N, Jet> {
+    fn moving(&self) -> ElementConfiguration<N, Rate> {
         let ElementConfiguration { arms, u, p, base } = &self.configuration;
         ElementConfiguration {
             arms: arms.map(Vec3::constant),
-            u: std::array::from_fn(|i| jet(u[i], self.displacements[i])),
-            p: std::array::from_fn(|i| jet(p[i], self.rotations[i].rate)),
+            u: std::array::from_fn(|i| with_rate(u[i], self.displacements[i])),
+            p: std::array::from_fn(|i| with_rate(p[i], self.rotations[i].rate)),
             base: base.map(|all| all.map(Mat3::constant)),
         }
     }
@@ -265,9 +265,9 @@ impl<const N: usize> ElementMotion<N> {
         I::fill_alone(&view, &sum, weights.stiffness, scratch, system);
         out.add_system(system, weights.stiffness != 0.0);
         if weights.stiffness != 0.0 || weights.damping != 0.0 {
-            let moving = I::alone(&self.jets());
+            let moving = I::alone(&self.moving());
             for (g, point) in points.iter().enumerate() {
-                let strains = Strains::new(self, &moving, &point.lifted(), &mut scratch_memory.jets);
+                let strains = Strains::new(self, &moving, &point.lifted(), &mut scratch_memory.moving);
                 let factor = damping.factor / point.weight;
                 strains.add_tangent(&damping.stiffness(points, g), factor, weights, out);
             }
@@ -293,9 +293,9 @@ impl<const N: usize> ElementMotion<N> {
     }
 }
 
-/// A vector with its rate as a jet.
-fn jet(value: Vec3, rate: Vec3) -> Vec3<Jet> {
-    Vec3(std::array::from_fn(|i| Jet { value: value.0[i], rate: rate.0[i], rate2: 0.0 }))
+/// A vector with its rate.
+fn with_rate(value: Vec3, rate: Vec3) -> Vec3<Rate> {
+    Vec3(std::array::from_fn(|i| Rate { value: value.0[i], rate: rate.0[i] }))
 }
 
 /// Points under constant stresses.
@@ -323,13 +323,13 @@ impl<const N: usize, const G: usize> PointSum<N, f64> for Stressed<'_, N, G> {
 
 /// A moving point, with its configuration, under a unit stress in one component.
 struct UnitStress<'a, const N: usize> {
-    point: &'a ElasticPoint<N, Jet>,
-    place: &'a Point<Jet>,
+    point: &'a ElasticPoint<N, Rate>,
+    place: &'a Point<Rate>,
     component: usize,
 }
 
-impl<const N: usize> PointSum<N, Jet> for UnitStress<'_, N> {
-    fn add(&self, _nodes: &[NodePlace<Jet>; N], _stiffness: f64, out: &mut ElementSystem<Jet>) {
+impl<const N: usize> PointSum<N, Rate> for UnitStress<'_, N> {
+    fn add(&self, _nodes: &[NodePlace<Rate>; N], _stiffness: f64, out: &mut ElementSystem<Rate>) {
         let unit = |part: usize| match self.component / 3 == part {
             true => Vec3::constant(Vec3::UNIT[self.component % 3]),
             false => Vec3::zero(),
@@ -337,7 +337,7 @@ impl<const N: usize> PointSum<N, Jet> for UnitStress<'_, N> {
         self.point.add_force(self.place, &Stress { n: unit(0), m: unit(1) }, out);
     }
 
-    fn add_geometric(&self, _nodes: &[NodePlace<Jet>; N], _out: &mut ElementSystem<Jet>) -> bool {
+    fn add_geometric(&self, _nodes: &[NodePlace<Rate>; N], _out: &mut ElementSystem<Rate>) -> bool {
         false
     }
 }
@@ -362,16 +362,16 @@ struct StrainBlock {
 impl Strains {
     fn new<const N: usize>(
         motion: &ElementMotion<N>,
-        moving: &impl View<N, Jet>,
-        point: &ElasticPoint<N, Jet>,
-        Workspace { system, scratch }: &mut Workspace<Jet>,
+        moving: &impl View<N, Rate>,
+        point: &ElasticPoint<N, Rate>,
+        Workspace { system, scratch }: &mut Workspace<Rate>,
     ) -> Self {
         let place = point.configuration(moving.nodes());
         let blocks = std::array::from_fn(|component| {
             moving.fill(&UnitStress { point, place: &place, component }, 0.0, scratch, system);
-            let block = |(b, moved): (usize, &[Jet; 3])| {
-                let force = Vec3(moved.map(|jet| jet.value));
-                let bent = Vec3(moved.map(|jet| jet.rate));
+            let block = |(b, moved): (usize, &[Rate; 3])| {
+                let force = Vec3(moved.map(|number| number.value));
+                let bent = Vec3(moved.map(|number| number.rate));
                 let (over_rate, lost) = motion.pull_back(b, force);
                 StrainBlock { force, over_rate, over_unknown: lost + bent }
             };

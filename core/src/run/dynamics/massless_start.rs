@@ -16,6 +16,12 @@ use crate::system::{Slot, State};
 /// The length of that step, over that of the first one of the stage.
 const INSTANT: f64 = 1e-6;
 
+/// The length of the next instant that is tried, over that of the one before.
+const SHORTER: f64 = 1e-2;
+
+/// Instants that are tried at most.
+const SHORTER_INSTANTS: usize = 4;
+
 impl Dynamics<'_, '_> {
     /// Puts what has neither mass nor damping where it is in balance, and gives what has damping alone the rate of
     /// balance.
@@ -59,11 +65,18 @@ fn put_in_balance(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Resu
     Ok(true)
 }
 
-/// Gives slots the rates of balance, if one is found.
+/// Gives slots the rates of balance, if one is found. Where damping brakes what has mass within that instant, a shorter
+/// one is tried.
 fn give_rates(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Result<(), Failure> {
-    let start = State::clone(stage.state);
-    if let Some(after) = state_after(stage, start, instant)? {
+    let mut instant = *instant;
+    for _ in 0..SHORTER_INSTANTS {
+        let start = State::clone(stage.state);
+        let Some(after) = state_after(stage, start, &instant)? else { return Ok(()) };
         slots.iter().for_each(|&slot| stage.state.v[slot] = after.v[slot]);
+        if !is_off_balance(stage, slots) {
+            return Ok(());
+        }
+        instant.length *= SHORTER;
     }
     Ok(())
 }

@@ -13,6 +13,7 @@
 
 use crate::effect::{ContactChange, Contacts};
 use crate::integrate::Equilibrium;
+use crate::kernel::Weights;
 use crate::run::distance::distance;
 use crate::run::stage_run::StageRun;
 use crate::scalar::CompressedField;
@@ -40,6 +41,9 @@ const SMALLEST_GROWTH: f64 = 1.05;
 /// Augmentations of a level, at most.
 const MOST_AUGMENTATIONS: usize = 20;
 
+/// Augmentations of a level after these, at most, which make small motions exact.
+const MOST_REFINEMENTS: usize = 4;
+
 /// Factor of the stiffness, and of gaps below which it stays.
 const GROWTH: f64 = 10.0;
 
@@ -62,7 +66,7 @@ const MANY_AUGMENTATIONS: usize = 3;
 const MOST_STIFFENINGS: usize = 2;
 
 /// Attempts at a level that looks at more pairs of beams, or at more surfaces, at most.
-const MOST_LISTS: usize = 4;
+const MOST_LISTS: usize = 12;
 
 /// The way in which contacts become firmer from one balanced state to the next.
 #[derive(Clone, Copy, Debug)]
@@ -214,7 +218,7 @@ impl StageRun<'_> {
 
     /// True if some point of the present iterate has a force.
     fn state_touches(&self) -> bool {
-        self.model.contacts().is_some_and(|contacts| contacts.survey(self.state).points > 0)
+        self.model.contacts().is_some_and(|contacts| contacts.survey(self.state, f64::INFINITY).points > 0)
     }
 
     /// Sets the stiffness with which levels begin, for the last good state and for the present one.
@@ -229,7 +233,9 @@ impl StageRun<'_> {
     fn augment(&mut self) -> Result<(), NewtonFailure> {
         let Some(contacts) = self.model.contacts() else { return Ok(()) };
         self.contact_change = ContactChange::None;
-        let mut survey = contacts.survey(self.state);
+        // That of the first balance: what moves by its penetration alone would be held ever more tightly.
+        let way = contacts.way(self.state);
+        let mut survey = contacts.survey(self.state, f64::INFINITY);
         if survey.points > 0 || self.good.contacts.touches() {
             self.newton.begin_anew();
         }
@@ -261,12 +267,40 @@ impl StageRun<'_> {
                 before = survey.violation;
                 augmentations += 1;
             }
-            survey = contacts.survey(self.state);
+            survey = contacts.survey(self.state, f64::INFINITY);
         }
-        if is_solved_again {
+        if self.refine(way)? || is_solved_again {
             self.refuse_far_steps()?;
         }
         self.end_augmentations(first, contraction, augmentations)
+    }
+
+    /// Makes penetrations small next to the way of the nodes in contact, as long as that succeeds; whether the state is
+    /// another one.
+    fn refine(&mut self, way: f64) -> Result<bool, NewtonFailure> {
+        let Some(contacts) = self.model.contacts() else { return Ok(false) };
+        for done in 0..MOST_REFINEMENTS {
+            if contacts.survey(self.state, way).violation <= 1.0 {
+                return Ok(done > 0);
+            }
+            let before = self.state.clone();
+            contacts.augment(self.state);
+            let factor = &mut self.state.contacts.factor;
+            *factor = (*factor * GROWTH).min(STIFFEST);
+            let Self { assembly, newton, state, model, counters, .. } = &mut *self;
+            newton.begin_anew();
+            match newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work) {
+                Ok(()) if !self.slides_away(&before) => {}
+                Err(interrupted @ NewtonFailure::Interrupted(_)) => return Err(interrupted),
+                Ok(()) | Err(_) => {
+                    self.state.copy_from(&before);
+                    self.assembly.forget();
+                    self.assembly.evaluate(self.state, Weights::NONE, None);
+                    return Ok(done > 0);
+                }
+            }
+        }
+        Ok(true)
     }
 
     /// Balances the state with firmer contacts. Their stiffness grows by the factor `growth`, or by

@@ -94,7 +94,7 @@ impl FrictionAccount {
         let [before, after] = [bookkeeper.ledger(), bookkeeper.ledger_at(entry)];
         let stored = after.strain - before.strain;
         let given = (after.external - before.external).max(bookkeeper.work_by_end_forces(entry));
-        let unbooked = contacts.survey(stage.state).work_in_penetration;
+        let unbooked = contacts.survey(stage.state, f64::INFINITY).work_in_penetration;
         Some(Exchange { given, taken, stored, unbooked })
     }
 

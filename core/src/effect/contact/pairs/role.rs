@@ -15,6 +15,9 @@ use std::sync::Arc;
 /// Penetrations between points with forces that are told, over those at such points, or over the allowed one.
 const MOST_HIDDEN: f64 = 2.0;
 
+/// The relative difference of lengths of elements that are equal.
+const SAME_LENGTH: f64 = 1e-6;
+
 /// Pairs of beams with the laws of their contacts.
 #[derive(Clone, Copy)]
 pub(in crate::effect::contact) struct PairRole<'a> {
@@ -104,6 +107,15 @@ impl<'a> PairRole<'a> {
         at.contacts.pairs.points = Arc::new(self.now(at).holding_points());
     }
 
+    /// The largest penetration of a pair in a balanced state. Straight elements of unequal length side by side are held at
+    /// the nodes of both, which leaves less freedom than the beams have: it stays as large as it is there.
+    fn tolerance(self, pair: &ListedPair, way: f64) -> f64 {
+        let strands = self.pairs.both(pair.meeting as usize);
+        let [a, b] = [0, 1].map(|side| strands[side].element_length(pair.elements[side] as usize));
+        let may_lock = strands.iter().all(|strand| strand.order == 1) && (a - b).abs() > SAME_LENGTH * a.max(b);
+        self.law_of(pair.meeting).tolerance(if may_lock { f64::INFINITY } else { way })
+    }
+
     /// Adds to what was found of other contacts in a balanced state, whose nodes have moved by up to `way`.
     pub fn survey(self, at: &State, way: f64, out: &mut ContactSurvey) {
         let mut largest = 0.0f64;
@@ -114,7 +126,7 @@ impl<'a> PairRole<'a> {
             out.points += usize::from(force > 0.0);
             out.work_in_penetration += point.candidate.weight * force * self.law_of(point.pair.meeting).penetration;
             let is_relevant = gap < 0.0 || force > RELEVANT_FORCE * largest;
-            let violation = gap.abs() / self.law_of(point.pair.meeting).tolerance(way);
+            let violation = gap.abs() / self.tolerance(&point.pair, way);
             if is_relevant && violation > out.violation {
                 *out = ContactSurvey { violation, gap, slot: self.slot_of(&point.pair), ..*out };
             }
