@@ -5,6 +5,7 @@ use crate::scenes::{distance, list, simulate};
 use beamsim::scene;
 use beamsim_core::tensor::Vec3;
 use beamsim_core::warning::WarningKind;
+use std::f64::consts::PI;
 
 /// Two bodies on joints, one to the ground and one between them, with gravity; random places, axes and inertia.
 fn mechanism(random: &mut Random, spins: bool) -> String {
@@ -253,5 +254,41 @@ fn drives_of_sliders_go_on_with_initial_velocities() {
             is_told,
             "{velocity} {of_beam}: {diagnostics:?}"
         );
+    }
+}
+
+/// A clamped beam that starts with one velocity everywhere, and damping in proportion to its stiffness: at the clamp its
+/// rotations, which have damping and no mass, take their rates from balance within a time in which shear has not yet braked
+/// what has mass.
+#[test]
+fn rates_of_balance_make_no_energy() {
+    let mut random = Random::new(41);
+    for case in 0..8 {
+        let [length, bending, mass] = [0; 3].map(|_| 10f64.powf(random.range(-2.0, 2.0)));
+        let stiff = 10f64.powf(random.range(5.0, 7.0)) * bending / (length * length);
+        let omega = 3.516 * (bending / mass).sqrt() / (length * length);
+        let damping = 2.0 * random.range(0.004, 0.02) / omega;
+        let speed = 1e-3 * omega * length;
+        let run = |steps: f64| {
+            let period = 2.0 * PI / omega;
+            simulate(&format!(
+                "[effects]\nlarge_rotations = {}\n[section.s]\nEA = {stiff:e}\nGA = {stiff:e}\nGJ = {bending:e}\nEI = {bending:e}\n\
+                 rhoA = {mass:e}\n[damping]\nstiffness = {damping:e}\n[[beam]]\nname = \"x\"\nsection = \"s\"\n\
+                 through = [[0, 0, 0], [{length:e}, 0, 0]]\nelements = 6\norder = 2\n[[support]]\nat = \"x@start\"\nfix = \"all\"\n\
+                 [[initial]]\nbeam = \"x\"\nvelocity = [0, 0, {speed:e}]\n[[stage]]\nkind = \"dynamic\"\nend = {:e}\nstep = {:e}\n\
+                 scheme = \"newmark\"\n[output]\nnodes = [\"x@end\"]\ncolumns = [\"u\", \"energy\"]\n",
+                case % 2 == 0,
+                0.5 * period,
+                period / steps,
+            ))
+        };
+        let [coarse, fine] = [100.0, 400.0].map(run);
+        let total = coarse.column("energy.total");
+        let most = total.iter().copied().fold(0.0, f64::max);
+        assert!((most / total[0] - 1.0).abs() < 0.01, "{most:e} of {:e}", total[0]);
+        let tips = [&coarse, &fine].map(|run| run.column("x@end.uz").into_iter().fold(0.0, f64::max));
+        assert!((tips[0] / tips[1] - 1.0).abs() < 0.01, "{tips:?}");
+        let [found] = coarse.counters.findings.time_errors[..] else { panic!("one stage") };
+        assert!(found.largest.displacement < 0.5 * found.largest.moved, "{found:?}");
     }
 }

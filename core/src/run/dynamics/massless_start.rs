@@ -19,6 +19,9 @@ const INSTANT: f64 = 1e-6;
 /// The length of the next instant that is tried, over that of the one before.
 const SHORTER: f64 = 1e-2;
 
+/// The imbalance that a shorter instant leaves, over that of a longer one, from which on it is no better.
+const BETTER: f64 = 0.5;
+
 /// Instants that are tried at most.
 const SHORTER_INSTANTS: usize = 4;
 
@@ -51,7 +54,7 @@ impl Dynamics<'_, '_> {
 /// Puts slots where they are in balance; `false` where they are, or where no balance is found: then they move in the first
 /// step.
 fn put_in_balance(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Result<bool, Failure> {
-    if !is_off_balance(stage, slots) {
+    if imbalance(stage, slots) <= 1.0 {
         return Ok(false);
     }
     // What has mass stays where it is.
@@ -69,22 +72,30 @@ fn put_in_balance(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Resu
 /// one is tried.
 fn give_rates(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Result<(), Failure> {
     let mut instant = *instant;
+    let mut least = f64::INFINITY;
     for _ in 0..SHORTER_INSTANTS {
         let start = State::clone(stage.state);
         let Some(after) = state_after(stage, start, &instant)? else { return Ok(()) };
+        let before = stage.state.v.clone();
         slots.iter().for_each(|&slot| stage.state.v[slot] = after.v[slot]);
-        if !is_off_balance(stage, slots) {
+        let imbalance = imbalance(stage, slots);
+        if imbalance >= BETTER * least {
+            // Round-off of places is a rate over an instant, and along axes without damping no rate balances.
+            stage.state.v.copy_from(&before);
+        }
+        if imbalance <= 1.0 || imbalance >= BETTER * least {
             return Ok(());
         }
+        least = imbalance;
         instant.length *= SHORTER;
     }
     Ok(())
 }
 
-/// True if forces on some of these slots are out of balance.
-fn is_off_balance(stage: &mut StageRun, slots: &[usize]) -> bool {
+/// The largest force out of balance on some of these slots, over the one that passes for none.
+fn imbalance(stage: &mut StageRun, slots: &[usize]) -> f64 {
     if slots.is_empty() {
-        return false;
+        return 0.0;
     }
     let StageRun { assembly, newton, state, model, .. } = stage;
     assembly.forget();
@@ -96,7 +107,7 @@ fn is_off_balance(stage: &mut StageRun, slots: &[usize]) -> bool {
         if model.kinds[slot] == SlotKind::Rotation { free / model.length } else { free }
     };
     let largest = slots.iter().map(out_of_balance).fold(0.0, f64::max);
-    largest > newton.convergence.tolerance * model.largest_force(system)
+    if largest == 0.0 { 0.0 } else { largest / (newton.convergence.tolerance * model.largest_force(system)) }
 }
 
 /// The state at the end of a step from `start`; `None` where no balance is found. That of the stage stays.

@@ -42,7 +42,7 @@ const SMALLEST_GROWTH: f64 = 1.05;
 const MOST_AUGMENTATIONS: usize = 20;
 
 /// Augmentations of a level after these, at most, which make small motions exact.
-const MOST_REFINEMENTS: usize = 4;
+const MOST_REFINEMENTS: usize = 6;
 
 /// Factor of the stiffness, and of gaps below which it stays.
 const GROWTH: f64 = 10.0;
@@ -279,14 +279,21 @@ impl StageRun<'_> {
     /// another one.
     fn refine(&mut self, way: f64) -> Result<bool, NewtonFailure> {
         let Some(contacts) = self.model.contacts() else { return Ok(false) };
+        let mut last = f64::INFINITY;
         for done in 0..MOST_REFINEMENTS {
-            if contacts.survey(self.state, way).violation <= 1.0 {
+            let violation = contacts.survey(self.state, way).violation;
+            if violation <= 1.0 {
                 return Ok(done > 0);
             }
             let before = self.state.clone();
             contacts.augment(self.state);
-            let factor = &mut self.state.contacts.factor;
-            *factor = (*factor * GROWTH).min(STIFFEST);
+            // Where the stiffness is large enough multipliers alone do.
+            if done > 0 && violation * GROWTH > last {
+                let factor = &mut self.state.contacts.factor;
+                *factor = (*factor * GROWTH).min(STIFFEST);
+            }
+            last = violation;
+            self.counters.contacts.augmentations += 1;
             let Self { assembly, newton, state, model, counters, .. } = &mut *self;
             newton.begin_anew();
             match newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work) {
