@@ -869,3 +869,22 @@ fn leaves_share_their_load_however_little_they_bend() {
     }
     println!("largest error: {worst:e}");
 }
+
+/// Turns of a coil that are apart by a diameter have no place in the tangent; those that are all but in contact have.
+#[test]
+fn turns_that_are_apart_are_not_listed() {
+    for (gap, are_near) in [(2.0, false), (0.5, false), (0.1, true)] {
+        let text = format!(
+            "[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 0.6\nEI = 0.8\n[[beam]]\nname = \"coil\"\nsection = \"s\"\n\
+             helix = {{ start = [10, 0, 0], axis = [0, 0, 1], pitch = {}, turns = 5 }}\nelements = 200\n\
+             [[support]]\nat = \"coil@start\"\nfix = \"all\"\n[[contact]]\nname = \"c\"\nbeams = [\"coil\"]\nself = true\nradius = 1\n\
+             [[stage]]\nkind = \"static\"\nsteps = 1\n",
+            2.0 + gap
+        );
+        let (scene, _) = scene::from_text(&text).unwrap_or_else(|e| panic!("{e:?}"));
+        let model = scene.plan.model;
+        let mut state = model.rest();
+        model.contacts().unwrap().list_pairs(&mut state);
+        assert_eq!(!state.contacts.pairs.list.is_empty(), are_near, "{gap}: {} pairs", state.contacts.pairs.list.len());
+    }
+}

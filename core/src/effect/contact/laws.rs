@@ -4,7 +4,7 @@ use crate::kernel::contact::{CarriedTraction, FrictionLaw, NodeBlocks, NormalLaw
 use crate::system::{ContactMemory, ContactRegime, ContactStiffness};
 
 /// The largest penetration of balanced states over the way of the nodes in contact.
-const TOLERANCE_OF_WAY: f64 = 1e-3;
+const TOLERANCE_OF_WAY: f64 = 1e-4;
 
 /// The gap up to which a point without a force counts as touching, over the largest penetration.
 pub(super) const TOUCHING: f64 = 1e-4;
