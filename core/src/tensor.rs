@@ -3,7 +3,7 @@
 //! Every function is `#[inline(always)]`, so that a kernel compiled for a wider instruction set
 //! keeps all of its operations in that instruction set.
 
-use crate::scalar::{LANES, Lanes, Pack, Real, pack};
+use crate::scalar::{LANES, Lanes, Pack, Rate, Real, pack};
 use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
@@ -130,6 +130,13 @@ impl Vec3<f64> {
     /// True if every component is finite.
     pub fn is_finite(self) -> bool {
         self.0.iter().all(|c| c.is_finite())
+    }
+}
+
+impl Vec3<Rate> {
+    /// A vector with its rate.
+    pub fn with_rate(value: Vec3, rate: Vec3) -> Self {
+        Self(std::array::from_fn(|k| Rate { value: value.0[k], rate: rate.0[k] }))
     }
 }
 

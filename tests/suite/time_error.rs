@@ -562,7 +562,7 @@ fn rotations_without_inertia_have_no_error_of_their_own() {
 }
 
 /// Where nothing restores what a load moves, the first slope of the force leaves an error that grows for the whole
-/// stage: a free mass, or one on a hinge, under a load that swings from a phase of its own.
+/// stage: a free body under a force or a moment that swings from a phase of its own.
 #[test]
 fn errors_of_loads_that_swing_what_is_free_are_known() {
     let mut random = Random::new(77);

@@ -23,11 +23,11 @@ pub trait Contacts {
     /// points reach the limit of friction within the allowed part of the element or the radius.
     fn needed_stick_factors(&self, at: &State) -> Vec<f64>;
 
-    /// How far a node that may touch something has moved at most since the start of the run.
-    fn way(&self, at: &State) -> f64;
+    /// The largest displacement in a state of a node that may touch something.
+    fn largest_displacement(&self, at: &State) -> f64;
 
-    /// Penetrations and changes of a balanced state, whose nodes have moved by up to `way`: penetrations are small next to
-    /// it.
+    /// Penetrations and changes of a balanced state. Penetrations are held against what is allowed, and against a small
+    /// part of the displacement `way` if that is less; infinite for the first alone.
     fn survey(&self, at: &State, way: f64) -> ContactSurvey;
 
     /// Takes the normal forces of a balanced state as multipliers.

@@ -270,7 +270,8 @@ pub trait Constraint {
     /// force (spatial), and moment conjugate to the rotation vector.
     fn held_by_ground(&self, at: &State, node: Node) -> (Vec3, Vec3);
 
-    /// Sets the rates of its own coordinates to those of its nodes.
+    /// Sets the rates of its own coordinates, which sliding joints alone have, to those of its nodes: the look at a deck
+    /// compares them with those of drives.
     fn follow_nodes(&self, _at: &mut State) {}
 
     /// The displacement of a node that has slid beyond the end of the beam it slides on.

@@ -432,7 +432,8 @@ impl CarriedError {
                 if slot.moves {
                     let ends = local.rates(slot, &step_ends, k);
                     let rings = local.rings(slot, ends);
-                    let fastest = step_ends.from.v[k].norm().max(to.v[k].norm());
+                    let mean = (to.q[k] - step_ends.from.q[k]).norm() * (1.0 / h);
+                    let fastest = mean.max(step_ends.from.v[k].norm()).max(to.v[k].norm());
                     let [mut of_place, mut of_rate] = local.within(fastest, local.of(slot, ends));
                     if !dof_map.is_plain(k as Slot) {
                         for error in [&mut of_place, &mut of_rate].into_iter().chain(&mut slot.apparent) {

@@ -23,7 +23,7 @@ use beamsim_core::warning::WarningKind;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// The smallest value of the largest penetration of contacts that name none, which follows motions, over that of the
+/// The smallest bound of penetrations that follows motions, in contacts that name none, over [`PENETRATION`] times the
 /// radius.
 const LEAST_PENETRATION: f64 = 1e-6;
 

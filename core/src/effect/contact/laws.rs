@@ -36,8 +36,8 @@ pub struct ContactLaws {
     pub stick: f64,
     /// The largest penetration, a length
     pub penetration: f64,
-    /// The smallest value to which the largest penetration of a balanced state goes down with small motions; that
-    /// itself where the deck has it
+    /// The smallest bound of penetrations of a balanced state, a length: they are held against small motions, too. It is
+    /// `penetration` where the deck gives that
     pub least_penetration: f64,
     /// c of the penalty, time per length
     pub damping: f64,
@@ -46,8 +46,8 @@ pub struct ContactLaws {
 }
 
 impl ContactLaws {
-    /// The largest penetration in a balanced state in which no node of a contact has moved by more than `way`: next to
-    /// motions it is small.
+    /// The largest penetration in a balanced state in which no node that may touch something has moved by more than `way`:
+    /// next to motions it is small.
     pub(super) fn tolerance(&self, way: f64) -> f64 {
         (TOLERANCE_OF_WAY * way).clamp(self.least_penetration, self.penetration)
     }

@@ -463,7 +463,7 @@ impl Contacts for SurfaceContacts {
         needed
     }
 
-    fn way(&self, at: &State) -> f64 {
+    fn largest_displacement(&self, at: &State) -> f64 {
         let strands = self.chains.iter().map(|chain| &chain.strand).chain(self.pairs.strands());
         let moved = strands.flat_map(|strand| &strand.nodes).map(|node| at.q[node.node.u as usize].squared());
         moved.fold(0.0, f64::max).sqrt()

@@ -52,10 +52,11 @@ impl SceneSurface {
     /// them and stand still; `size` is a length of the order of gaps.
     pub fn leaves(&self, other: &Self, size: f64) -> Option<Vec3> {
         let stand_still = [self, other].iter().all(|surface| matches!(surface.carrier, SurfaceCarrier::Ground));
+        if !stand_still || other.surface.centre_line_of_lumen().is_empty() {
+            return None;
+        }
         let is_outside = |place: &Vec3| other.surface.value(*place, size).is_some_and(|gap| gap < 0.0);
-        let is_tube = |surface: &Surface| !surface.centre_line_of_lumen().is_empty();
-        let may_leave = stand_still && is_tube(&other.surface);
-        self.surface.centre_line_of_lumen().into_iter().filter(|_| may_leave).find(is_outside)
+        self.surface.centre_line_of_lumen().into_iter().find(is_outside)
     }
 
     /// The angle of a prescribed rotation between two lists of amplitudes, in radians.

@@ -131,7 +131,7 @@ impl ElementStresses {
     /// Adds the stress of strain-rate damping at each integration point. `linear`: in a linear
     /// stage, where it is of first order.
     pub(super) fn add_damping(&mut self, stresses: &[Stress], linear: bool) {
-        let part = |v: Vec3| if linear { with_change(Vec3::ZERO, v) } else { with_change(v, Vec3::ZERO) };
+        let part = |v: Vec3| if linear { Vec3::with_rate(Vec3::ZERO, v) } else { Vec3::with_rate(v, Vec3::ZERO) };
         for (point, stress) in self.points.iter_mut().zip(stresses) {
             point.damping = Stress { n: part(stress.n), m: part(stress.m) };
         }
@@ -201,7 +201,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         });
         let nodes: [NodePlace<Rate>; N] = std::array::from_fn(|i| {
             let NodePlace { u, p } = view.nodes()[i];
-            NodePlace { u: with_change(u, change[i].0), p: with_change(p, change[i].1) }
+            NodePlace { u: Vec3::with_rate(u, change[i].0), p: Vec3::with_rate(p, change[i].1) }
         });
         // Free strains act as loads of a linear stage: its geometric stiffness leaves their stresses
         // out.
@@ -224,11 +224,6 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
             points: self.points().iter().zip(gauss(G)).map(of_point).collect(),
         }
     }
-}
-
-/// A vector with its change in a linear stage.
-fn with_change(value: Vec3, change: Vec3) -> Vec3<Rate> {
-    Vec3(std::array::from_fn(|k| Rate { value: value.0[k], rate: change.0[k] }))
 }
 
 /// The sum of a vector and its change.

@@ -244,8 +244,8 @@ impl<const N: usize> ElementMotion<N> {
         let ElementConfiguration { arms, u, p, base } = &self.configuration;
         ElementConfiguration {
             arms: arms.map(Vec3::constant),
-            u: std::array::from_fn(|i| with_rate(u[i], self.displacements[i])),
-            p: std::array::from_fn(|i| with_rate(p[i], self.rotations[i].rate)),
+            u: std::array::from_fn(|i| Vec3::with_rate(u[i], self.displacements[i])),
+            p: std::array::from_fn(|i| Vec3::with_rate(p[i], self.rotations[i].rate)),
             base: base.map(|all| all.map(Mat3::constant)),
         }
     }
@@ -291,11 +291,6 @@ impl<const N: usize> ElementMotion<N> {
             damping.stiffness(points, g).stress(&scaled)
         })
     }
-}
-
-/// A vector with its rate.
-fn with_rate(value: Vec3, rate: Vec3) -> Vec3<Rate> {
-    Vec3(std::array::from_fn(|i| Rate { value: value.0[i], rate: rate.0[i] }))
 }
 
 /// Points under constant stresses.

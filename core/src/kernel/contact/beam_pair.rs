@@ -410,16 +410,20 @@ impl<const NA: usize, const NB: usize, T: Real> Pair<'_, NA, NB, T> {
     fn add_moving(&self, loads: &Loads<T>, weight: f64, out: &mut ElementSystem<T>) {
         let Some(inverse) = invert(self.second_derivatives(), self.law.free) else { return };
         let gradients = self.gradients();
-        for (of_parameter, by) in inverse.iter().enumerate().filter(|(number, _)| self.law.free[*number]) {
-            let forces = if of_parameter == 0 { self.along_a(loads) } else { self.along_b(loads) };
-            // How the parameter moves with the displacements, the only unknowns that F depends on.
-            let moves = |node: usize| (gradients[0][node] * by[0] + gradients[1][node] * by[1]).scale(-weight);
+        let mut add = |forces: &ByBlock<T>, by: &[T; 2]| {
             for node in 0..NA + NB {
-                let moves = moves(node);
+                // How the parameter moves with the displacements, the only unknowns that F depends on.
+                let moves = (gradients[0][node] * by[0] + gradients[1][node] * by[1]).scale(-weight);
                 for row in 0..self.count() {
                     out.add_tangent(row, self.blocks.of(node), forces[row].outer(moves));
                 }
             }
+        };
+        if self.law.free[0] {
+            add(&self.along_a(loads), &inverse[0]);
+        }
+        if self.law.free[1] {
+            add(&self.along_b(loads), &inverse[1]);
         }
     }
 

@@ -27,6 +27,9 @@ const CAUTION: f64 = 0.9;
 /// counts.
 const MAX_ADVANCES: usize = 200;
 
+/// The square of the sine between straight elements up to which they have no closest points of their own.
+const PARALLEL: f64 = 1e-20;
+
 /// Closest points of two elements, or of two segments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestPair {
@@ -163,14 +166,17 @@ impl PairMinima {
     }
 }
 
-/// The bilateral closest points of two elements with nodes at `a` and `b`: a descent from the closest
-/// points of their chords by Newton's method, which ends as nothing outside of the elements, and
-/// where the second derivatives of the distance are not positive definite.
+/// The bilateral closest points of two elements with nodes at `a` and `b`. Straight elements have a closed form; others a
+/// descent from the closest points of their chords by Newton's method, which ends as nothing outside of the elements,
+/// and where the second derivatives of the distance are not positive definite.
 pub fn bilateral<const NA: usize, const NB: usize>(a: &[Vec3; NA], b: &[Vec3; NB]) -> PairMinima {
     let mut out = PairMinima::default();
     if let ([a0, a1], [b0, b1]) = (&a[..], &b[..]) {
         let segments = Segments { a: [*a0, *a1], b: [*b0, *b1] };
-        segments.between_the_ends().into_iter().for_each(|pair| out.offer(pair));
+        let [u, v] = [segments.a, segments.b].map(|[from, to]| to - from);
+        // Those of parallel ones are round-off.
+        let are_apart = u.cross(v).squared() > PARALLEL * u.squared() * v.squared();
+        segments.between_the_ends().filter(|_| are_apart).into_iter().for_each(|pair| out.offer(pair));
         return out;
     }
     for i in 1..NA {
@@ -270,9 +276,9 @@ pub fn closest_to_point<const N: usize>(point: Vec3, nodes: &[Vec3; N]) -> Minim
     if let [from, to] = nodes[..] {
         let along = to - from;
         let s = (point - from).dot(along) / along.squared();
-        let is_on_line = || (from + along * s - point).squared() == 0.0;
-        let kind = |is_on_line: bool| if is_on_line { MinimumKind::Kink } else { MinimumKind::Sharp };
-        return Minima::of((s > 0.0 && s < 1.0).then(|| Minimum { s, kind: kind(is_on_line()) }));
+        let is_on_line = (from + along * s - point).squared() == 0.0;
+        let kind = if is_on_line { MinimumKind::Kink } else { MinimumKind::Sharp };
+        return Minima::of((s > 0.0 && s < 1.0).then_some(Minimum { s, kind }));
     }
     minima(nodes, intervals_of_convex(N), &|y| sphere(y - point, 0.0, 0.0).ok())
 }
@@ -400,5 +406,14 @@ mod tests {
         assert_eq!(found.found().len(), 1);
         assert!((found.found()[0].s - 0.5).abs() < 1e-12);
         assert!(closest_to_point(Vec3([3.0, 0.0, 0.0]), &nodes).found().is_empty());
+        let straight = [Vec3([1.0, 0.0, 0.0]), Vec3([3.0, 0.0, 0.0])];
+        for (point, expected) in [
+            (Vec3([1.5, 0.0, 2.0]), Some(Minimum { s: 0.25, kind: MinimumKind::Sharp })),
+            (Vec3([2.0, 0.0, 0.0]), Some(Minimum { s: 0.5, kind: MinimumKind::Kink })),
+            (Vec3([0.5, 0.0, 1.0]), None),
+            (Vec3([3.5, 0.0, 1.0]), None),
+        ] {
+            assert_eq!(closest_to_point(point, &straight).found().first(), expected.as_ref(), "{point:?}");
+        }
     }
 }

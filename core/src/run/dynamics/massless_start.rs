@@ -19,11 +19,11 @@ const INSTANT: f64 = 1e-6;
 /// The length of the next instant that is tried, over that of the one before.
 const SHORTER: f64 = 1e-2;
 
-/// The imbalance that a shorter instant leaves, over that of a longer one, from which on it is no better.
-const BETTER: f64 = 0.5;
+/// A shorter instant must leave no more than this part of the imbalance, or no other one is tried.
+const WORTHWHILE: f64 = 0.5;
 
-/// Instants that are tried at most.
-const SHORTER_INSTANTS: usize = 4;
+/// The number of instants that are tried at most.
+const MOST_INSTANTS: usize = 4;
 
 impl Dynamics<'_, '_> {
     /// Puts what has neither mass nor damping where it is in balance, and gives what has damping alone the rate of
@@ -73,17 +73,18 @@ fn put_in_balance(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Resu
 fn give_rates(stage: &mut StageRun, slots: &[usize], instant: &Step) -> Result<(), Failure> {
     let mut instant = *instant;
     let mut least = f64::INFINITY;
-    for _ in 0..SHORTER_INSTANTS {
+    for _ in 0..MOST_INSTANTS {
         let start = State::clone(stage.state);
         let Some(after) = state_after(stage, start, &instant)? else { return Ok(()) };
         let before = stage.state.v.clone();
         slots.iter().for_each(|&slot| stage.state.v[slot] = after.v[slot]);
         let imbalance = imbalance(stage, slots);
-        if imbalance >= BETTER * least {
+        let is_better = imbalance < least;
+        if !is_better {
             // Round-off of places is a rate over an instant, and along axes without damping no rate balances.
             stage.state.v.copy_from(&before);
         }
-        if imbalance <= 1.0 || imbalance >= BETTER * least {
+        if !is_better || imbalance <= 1.0 || imbalance > WORTHWHILE * least {
             return Ok(());
         }
         least = imbalance;

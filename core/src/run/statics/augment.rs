@@ -234,7 +234,7 @@ impl StageRun<'_> {
         let Some(contacts) = self.model.contacts() else { return Ok(()) };
         self.contact_change = ContactChange::None;
         // That of the first balance: what moves by its penetration alone would be held ever more tightly.
-        let way = contacts.way(self.state);
+        let way = contacts.largest_displacement(self.state);
         let mut survey = contacts.survey(self.state, f64::INFINITY);
         if survey.points > 0 || self.good.contacts.touches() {
             self.newton.begin_anew();
@@ -269,23 +269,24 @@ impl StageRun<'_> {
             }
             survey = contacts.survey(self.state, f64::INFINITY);
         }
-        if self.refine(way)? || is_solved_again {
+        if is_solved_again {
             self.refuse_far_steps()?;
         }
+        self.refine(way)?;
         self.end_augmentations(first, contraction, augmentations)
     }
 
-    /// Makes penetrations small next to the way of the nodes in contact, as long as that succeeds; whether the state is
-    /// another one.
-    fn refine(&mut self, way: f64) -> Result<bool, NewtonFailure> {
-        let Some(contacts) = self.model.contacts() else { return Ok(false) };
+    /// Makes penetrations small next to the way of the nodes in contact, as long as that succeeds.
+    fn refine(&mut self, way: f64) -> Result<(), NewtonFailure> {
+        let Some(contacts) = self.model.contacts() else { return Ok(()) };
         let mut last = f64::INFINITY;
         for done in 0..MOST_REFINEMENTS {
             let violation = contacts.survey(self.state, way).violation;
             if violation <= 1.0 {
-                return Ok(done > 0);
+                break;
             }
             let before = self.state.clone();
+            let was_shortened = self.newton.was_shortened;
             contacts.augment(self.state);
             // Where the stiffness is large enough multipliers alone do.
             if done > 0 && violation * GROWTH > last {
@@ -296,18 +297,20 @@ impl StageRun<'_> {
             self.counters.contacts.augmentations += 1;
             let Self { assembly, newton, state, model, counters, .. } = &mut *self;
             newton.begin_anew();
-            match newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work) {
-                Ok(()) if !self.slides_away(&before) => {}
-                Err(interrupted @ NewtonFailure::Interrupted(_)) => return Err(interrupted),
-                Ok(()) | Err(_) => {
-                    self.state.copy_from(&before);
-                    self.assembly.forget();
-                    self.assembly.evaluate(self.state, Weights::NONE, None);
-                    return Ok(done > 0);
-                }
+            let solved = newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work);
+            if let Err(interrupted @ NewtonFailure::Interrupted(_)) = solved {
+                return Err(interrupted);
+            }
+            let stays = solved.and_then(|()| self.refuse_far_steps()).and_then(|()| self.refuse_passing());
+            if stays.is_err() || self.slides_away(&before) {
+                self.state.copy_from(&before);
+                self.newton.was_shortened = was_shortened;
+                self.assembly.forget();
+                self.assembly.evaluate(self.state, Weights::NONE, None);
+                break;
             }
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Balances the state with firmer contacts. Their stiffness grows by the factor `growth`, or by

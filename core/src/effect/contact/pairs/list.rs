@@ -1,7 +1,7 @@
 //! The list of pairs of elements that are near each other.
 //!
 //! It is made from the places of nodes in a state that is accepted, and holds all pairs nearer than
-//! a margin m. As long as no node has moved by more than m/2 since, no other pair can touch. A step
+//! a margin m, those that may touch in the next step, and some that were listed before. As long as no node has moved by more than m/2 since, no other pair can touch. A step
 //! that moves some node farther is looked at as a whole: pairs that its motion may bring together
 //! are added, and the step is taken again.
 
@@ -115,7 +115,7 @@ impl BeamPairs {
         if list.is_empty() { Vec::new() } else { self.directions(places) }
     }
 
-    /// The smallest margin of a list.
+    /// The margin of a list.
     fn margin(&self) -> f64 {
         let of_strand = |strand: &Strand| {
             let lengths = (0..strand.elements()).map(|k| super::arcs_of(strand, k)).map(|[from, to]| to - from);
@@ -151,12 +151,13 @@ impl BeamPairs {
         };
         let has_some = (0..self.len()).any(|meeting| self.contact_of(meeting) == contact);
         let listed = least(&memory.list);
-        if listed <= memory.margin || !has_some {
+        // Nodes move by a quarter of the margin at most before a list is made anew.
+        if listed <= (1.0 - 2.0 * OLD) * memory.margin || !has_some {
             return listed;
         }
         let places = self.places(at);
         let size = farthest(&places, &vec![places[0]; places.len()]);
-        let mut margin = 2.0 * self.margin();
+        let mut margin = if listed.is_finite() { listed } else { 2.0 * self.margin() };
         loop {
             let gap = least(&self.near(&places, margin, &|_, _| true));
             if gap <= margin || margin > 4.0 * size {

@@ -15,9 +15,6 @@ use std::sync::Arc;
 /// Penetrations between points with forces that are told, over those at such points, or over the allowed one.
 const MOST_HIDDEN: f64 = 2.0;
 
-/// The relative difference of lengths of elements that are equal.
-const SAME_LENGTH: f64 = 1e-6;
-
 /// Pairs of beams with the laws of their contacts.
 #[derive(Clone, Copy)]
 pub(in crate::effect::contact) struct PairRole<'a> {
@@ -107,12 +104,10 @@ impl<'a> PairRole<'a> {
         at.contacts.pairs.points = Arc::new(self.now(at).holding_points());
     }
 
-    /// The largest penetration of a pair in a balanced state. Straight elements of unequal length side by side are held at
-    /// the nodes of both, which leaves less freedom than the beams have: it stays as large as it is there.
+    /// The largest penetration of a pair in a balanced state. Straight elements side by side are held at the nodes of
+    /// both, which leaves less freedom than the beams have: there it does not become smaller with motions.
     fn tolerance(self, pair: &ListedPair, way: f64) -> f64 {
-        let strands = self.pairs.both(pair.meeting as usize);
-        let [a, b] = [0, 1].map(|side| strands[side].element_length(pair.elements[side] as usize));
-        let may_lock = strands.iter().all(|strand| strand.order == 1) && (a - b).abs() > SAME_LENGTH * a.max(b);
+        let may_lock = self.pairs.both(pair.meeting as usize).iter().all(|strand| strand.order == 1);
         self.law_of(pair.meeting).tolerance(if may_lock { f64::INFINITY } else { way })
     }
 

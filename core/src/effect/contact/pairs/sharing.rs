@@ -183,7 +183,7 @@ impl PairsNow<'_> {
         if self.part_of_closest(pair, middle + spreads, middle + spreads) == 0.0 {
             return Some(Kinds { closest: false, nodes: true });
         }
-        // Nor smaller than 3 t/(1 + 2 sqrt(1 + t^2)).
+        // An angle with the tangent t is at least 3 t/(1 + 2 sqrt(1 + t^2)) (Shafer 1966).
         let least = 3.0 * middle / (1.0 + 2.0 * (1.0 + middle * middle).sqrt());
         (least - spreads >= CROSSING).then_some(Kinds { closest: true, nodes: false })
     }
