@@ -704,6 +704,38 @@ impl LocalErrors {
         [at_most(of_place, most * self.length), at_most(of_rate, most)]
     }
 
+    /// How far the slope of a slot has changed to `slope`. A change that is missed at the start moves what nothing holds for
+    /// the whole stage.
+    fn change(&self, slot: &SlotError, slope: Vec3) -> Vec3 {
+        let change = slope - slot.slope;
+        let is_known = match self.start {
+            Some(_) => usize::from(slot.age) + 1 >= self.settling,
+            None => usize::from(slot.age) >= self.settling,
+        };
+        // Without a slope of the start the first change stands for the one before it, too.
+        let stands_for_two = self.start.is_none() && usize::from(slot.age) == self.settling;
+        if !is_known {
+            Vec3::ZERO
+        } else if stands_for_two {
+            change * 2.0
+        } else {
+            change
+        }
+    }
+
+    /// The slope that the next one is compared with: that of the start until slopes are complete.
+    fn kept_slope(&self, slot: &SlotError, slope: Vec3, [before, after]: [Vec3; 2]) -> Vec3 {
+        let age = usize::from(slot.age);
+        let Some(start) = &self.start else { return slope };
+        if age == 1 {
+            start.slope([slot.past[self.earlier(2)], before, after])
+        } else if age > 1 && age + 1 < self.settling {
+            slot.slope
+        } else {
+            slope
+        }
+    }
+
     /// The local errors tau and tau', from the rates of the error at both ends of the step.
     #[inline(always)]
     fn of(&self, slot: &mut SlotError, [before, after]: [Vec3; 2]) -> [Vec3; 2] {
@@ -715,20 +747,8 @@ impl LocalErrors {
             slot.past = [before; SLOPE_STEPS];
         }
         let slope = (after - slot.past[self.earlier(self.steps)]) * self.per_span;
-        let age = usize::from(slot.age);
-        // A change that is missed at the start moves what nothing holds for the whole stage.
-        let change = match self.start {
-            Some(_) if age + 1 >= self.settling => slope - slot.slope,
-            // The first one stands for the one before it, too.
-            None if age == self.settling => (slope - slot.slope) * 2.0,
-            None if age > self.settling => slope - slot.slope,
-            Some(_) | None => Vec3::ZERO,
-        };
-        slot.slope = match &self.start {
-            Some(start) if age == 1 => start.slope([slot.past[self.earlier(2)], before, after]),
-            Some(_) if age > 1 && age + 1 < self.settling => slot.slope,
-            Some(_) | None => slope,
-        };
+        let change = self.change(slot, slope);
+        slot.slope = self.kept_slope(slot, slope, [before, after]);
         slot.age = (SLOPE_STEPS as u8).min(slot.age + 1);
         slot.past[self.place] = after;
         slot.apparent = [after + slope * self.length, slope].map(|rate| rate * self.of_apparent);

@@ -5,14 +5,14 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A function of time near an instant, to first order.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rate<T = f64> {
+pub struct Rate {
     /// The value
-    pub(crate) value: T,
+    pub(crate) value: f64,
     /// The derivative over time
-    pub(crate) rate: T,
+    pub(crate) rate: f64,
 }
 
-impl<T: Real> Add for Rate<T> {
+impl Add for Rate {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -20,7 +20,7 @@ impl<T: Real> Add for Rate<T> {
     }
 }
 
-impl<T: Real> Sub for Rate<T> {
+impl Sub for Rate {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -28,7 +28,7 @@ impl<T: Real> Sub for Rate<T> {
     }
 }
 
-impl<T: Real> Neg for Rate<T> {
+impl Neg for Rate {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -36,7 +36,7 @@ impl<T: Real> Neg for Rate<T> {
     }
 }
 
-impl<T: Real> Mul for Rate<T> {
+impl Mul for Rate {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -44,17 +44,17 @@ impl<T: Real> Mul for Rate<T> {
     }
 }
 
-impl<T: Real> Div for Rate<T> {
+impl Div for Rate {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        let inverse = T::one() / other.value;
+        let inverse = 1.0 / other.value;
         let value = self.value * inverse;
         Self { value, rate: (self.rate - value * other.rate) * inverse }
     }
 }
 
-impl<T: Real> Mul<f64> for Rate<T> {
+impl Mul<f64> for Rate {
     type Output = Self;
     #[inline(always)]
     fn mul(self, factor: f64) -> Self {
@@ -62,24 +62,24 @@ impl<T: Real> Mul<f64> for Rate<T> {
     }
 }
 
-impl<T: Real> AddAssign for Rate<T> {
+impl AddAssign for Rate {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl<T: Real> SubAssign for Rate<T> {
+impl SubAssign for Rate {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
 
-impl<T: Real> Real for Rate<T> {
+impl Real for Rate {
     #[inline(always)]
     fn constant(value: f64) -> Self {
-        Self { value: T::constant(value), rate: T::zero() }
+        Self { value, rate: 0.0 }
     }
 
     #[inline(always)]
@@ -93,29 +93,27 @@ impl<T: Real> Real for Rate<T> {
         // d atan2(y, x) = (x dy - y dx) / (x^2 + y^2)
         let square = self.value * self.value + x.value * x.value;
         let turn = x.value * self.rate - self.value * x.rate;
-        Self { value: self.value.atan2(x.value), rate: turn / square }
+        Self { value: Real::atan2(self.value, x.value), rate: turn / square }
     }
 
     #[inline(always)]
     fn largest(self) -> f64 {
-        self.value.largest()
+        self.value
     }
 
     #[inline(always)]
     fn above(self, limit: f64, then: Self, otherwise: Self) -> Self {
-        let choose = |then: T, otherwise: T| self.value.above(limit, then, otherwise);
-        Self { value: choose(then.value, otherwise.value), rate: choose(then.rate, otherwise.rate) }
+        if self.value > limit { then } else { otherwise }
     }
 
     #[inline(always)]
     fn apart<R>(work: impl FnOnce() -> R) -> R {
-        T::apart(work)
+        f64::apart(work)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Lanes;
     use super::*;
 
     #[test]
@@ -129,13 +127,5 @@ mod tests {
         assert!((found.value - value).abs() < 1e-14 && (found.rate - rate).abs() < 1e-8, "{found:?} {value} {rate}");
         let above = found.above(0.0, Rate::constant(1.0), Rate::zero());
         assert_eq!((above.value, above.rate), (1.0, 0.0));
-    }
-
-    #[test]
-    fn lanes_have_their_own_rates() {
-        let x = Rate { value: Lanes([1.0, 2.0, 3.0, 4.0]), rate: Lanes([1.0, 0.0, -1.0, 2.0]) };
-        let square = x * x / Rate::constant(2.0);
-        assert_eq!(square.value.0, [0.5, 2.0, 4.5, 8.0]);
-        assert_eq!(square.rate.0, [1.0, 0.0, -3.0, 8.0]);
     }
 }

@@ -96,7 +96,8 @@ pub enum Feature {
     End,
 }
 
-/// Reasons for which a point has no distance with a normal. In the middle of holes it has one, since the distance from the axis is rounded off there.
+/// Reasons for which a point has no distance with a normal. In the middle of holes it has one, since the distance from
+/// the axis is rounded off there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Undefined {
     /// The point is the centre of a sphere or of a spherical end

@@ -165,26 +165,12 @@ impl Surface {
 
     /// Places along the centre line of a tube that holds points within it; none of other surfaces.
     pub fn centre_line_of_lumen(&self) -> Vec<Vec3> {
-        match (&self.shape, self.side) {
-            (Shape::Tube(tube), Side::Inside) => {
-                let between = |ends: &[(Vec3, f64)]| {
-                    let [(from, _), (to, _)] = [ends[0], ends[1]];
-                    (0..=PARTS_OF_PIECE).map(move |k| from + (to - from) * (k as f64 / PARTS_OF_PIECE as f64))
-                };
-                tube.sections().windows(2).flat_map(between).collect()
-            }
-            (
-                Shape::Plane { .. }
-                | Shape::Sphere { .. }
-                | Shape::Cylinder { .. }
-                | Shape::Cone(_)
-                | Shape::Torus { .. }
-                | Shape::Box { .. }
-                | Shape::Tube(_)
-                | Shape::Mesh(_),
-                Side::Outside | Side::Inside,
-            ) => Vec::new(),
-        }
+        let (Shape::Tube(tube), Side::Inside) = (&self.shape, self.side) else { return Vec::new() };
+        let between = |ends: &[(Vec3, f64)]| {
+            let [(from, _), (to, _)] = [ends[0], ends[1]];
+            (0..=PARTS_OF_PIECE).map(move |k| from + (to - from) * (k as f64 / PARTS_OF_PIECE as f64))
+        };
+        tube.sections().windows(2).flat_map(between).collect()
     }
 
     /// True for a plane: the closest point of an element has no place of its own there, since the element alone bends.

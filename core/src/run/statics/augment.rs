@@ -276,6 +276,13 @@ impl StageRun<'_> {
         self.end_augmentations(first, contraction, augmentations)
     }
 
+    /// Balances the state anew, with other contacts than before.
+    fn balance_again(&mut self) -> Result<(), NewtonFailure> {
+        let Self { assembly, newton, state, model, counters, .. } = &mut *self;
+        newton.begin_anew();
+        newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work)
+    }
+
     /// Makes penetrations small next to the way of the nodes in contact, as long as that succeeds.
     fn refine(&mut self, way: f64) -> Result<(), NewtonFailure> {
         let Some(contacts) = self.model.contacts() else { return Ok(()) };
@@ -295,9 +302,7 @@ impl StageRun<'_> {
             }
             last = violation;
             self.counters.contacts.augmentations += 1;
-            let Self { assembly, newton, state, model, counters, .. } = &mut *self;
-            newton.begin_anew();
-            let solved = newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work);
+            let solved = self.balance_again();
             if let Err(interrupted @ NewtonFailure::Interrupted(_)) = solved {
                 return Err(interrupted);
             }
@@ -333,9 +338,7 @@ impl StageRun<'_> {
             if next.sticks_softly {
                 contacts.stick_part = (contacts.stick_part * *growth).min(1.0);
             }
-            let Self { assembly, newton, state, model, counters, .. } = &mut *self;
-            newton.begin_anew();
-            match newton.solve(model, assembly, state, &Equilibrium, None, &mut counters.work) {
+            match self.balance_again() {
                 Ok(()) => {
                     let slid_from = before.as_ref().filter(|before| self.slides_away(before));
                     match slid_from {

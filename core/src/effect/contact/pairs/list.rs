@@ -1,9 +1,9 @@
 //! The list of pairs of elements that are near each other.
 //!
-//! It is made from the places of nodes in a state that is accepted, and holds all pairs nearer than
-//! a margin m, those that may touch in the next step, and some that were listed before. As long as no node has moved by more than m/2 since, no other pair can touch. A step
-//! that moves some node farther is looked at as a whole: pairs that its motion may bring together
-//! are added, and the step is taken again.
+//! It is made from the places of nodes in a state that is accepted, and holds all pairs nearer than a margin m,
+//! those that may touch in the next step, and some that were listed before. As long as no node has moved by more
+//! than m/2 since, no other pair can touch. A step that moves some node farther is looked at as a whole: pairs that
+//! its motion may bring together are added, and the step is taken again.
 
 use super::point::PairsNow;
 use super::{BeamPairs, ElementOf, PairRole, Strand};
