@@ -522,6 +522,35 @@ fn errors_of_heavy_tops_are_known() {
     }
 }
 
+/// What flies may be where it should be, and turned by a wrong angle.
+#[test]
+fn errors_of_rotations_are_told_of_bodies_that_fly() {
+    let mut random = Random::new(5);
+    let [mut wrong, mut right] = [0, 0];
+    for case in 0..40 {
+        let scheme = ["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"][case % 4];
+        let inertia = [random.range(0.1, 0.15), random.range(0.15, 0.2), random.range(0.2, 0.24)];
+        let spin = random.vector(6.0).0;
+        let body = |scheme: &str, step: f64| {
+            simulate(&format!(
+                "[point]\np = [0, 0, 0]\n[[body]]\nat = \"p\"\nmass = 1\ninertia = {inertia:?}\n\
+                 [[initial]]\nat = \"p\"\nvelocity = [30, 0, 0]\nspin = {spin:?}\n[output]\nnodes = [\"p\"]\n\
+                 columns = [\"q\"]\n[[stage]]\nkind = \"dynamic\"\nend = 12\nstep = {step}\nscheme = \"{scheme}\"\n"
+            ))
+        };
+        let step = if case < 20 { 0.08 } else { 0.004 };
+        let [run, exact] = [body(scheme, step), body("lobatto", 0.004)];
+        let error = largest_angle(&run, &exact, "p", (step / 0.004).round() as usize);
+        let is_told = doubts(&run).contains(&WarningKind::LongSteps);
+        assert!(is_told || error < 0.7, "{scheme}, {inertia:?}, {spin:?}: {error} rad in silence");
+        assert!(!is_told || error > 0.1, "{scheme}, {inertia:?}, {spin:?}: {error} rad are told");
+        wrong += usize::from(error > 0.3);
+        right += usize::from(error < 0.05);
+    }
+    println!("{wrong} wrong, {right} right");
+    assert!(wrong > 5 && right > 5, "{wrong} wrong, {right} right");
+}
+
 /// A pendulum of one body errs by as much whatever moves beside it: its mass centre swings, its node stands still.
 #[test]
 fn errors_of_mass_centres_are_told() {
