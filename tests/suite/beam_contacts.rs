@@ -770,6 +770,19 @@ fn approaches_from_afar_pass_nothing() {
     }
 }
 
+/// Beams of two and of three elements that are pressed on each other and come apart: the overlap between their points is
+/// told where a row shows it, though the stage ends without.
+#[test]
+fn penetrations_between_points_are_told_of_all_rows() {
+    let text = std::fs::read_to_string("decks/contact/beams_of_unequal_meshes.toml").unwrap();
+    let stops = text.replace("steps = 4", "steps = 4\n[history.h]\ntimes = [0, 0.5, 1]\nvalues = [0, 1, 0]");
+    let released = stops.replace("force = [0, 0, ", "history = \"h\"\nforce = [0, 0, ");
+    let warned = attempt(&released).counters.findings.warnings;
+    let told = warned.iter().find(|warning| warning.kind == WarningKind::HiddenPenetration);
+    let message = &told.expect("a warning").message;
+    assert!(message.contains("at load factor 0.5"), "{message}");
+}
+
 /// Bars of one element that cross at an angle so small that their ends carry all of the force: the overlap in
 /// between is told.
 #[test]

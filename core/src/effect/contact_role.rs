@@ -3,6 +3,7 @@
 use crate::kernel::contact::{FrictionLaw, PointState, Status};
 use crate::system::{Slot, State};
 use crate::tensor::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Penetrations beyond this multiple of the allowed one are warned of: what rests penetrates by exactly one.
 pub const TOLD_PENETRATION: f64 = 1.01;
@@ -153,7 +154,7 @@ pub struct ContactSurvey {
 }
 
 /// A penetration of a surface.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Penetration {
     /// Name of the contact
     pub(crate) contact: String,

@@ -1,5 +1,6 @@
 //! Warnings that a run has given already.
 
+use crate::effect::Penetration;
 use serde::{Deserialize, Serialize};
 
 /// Warnings that have been given already, and how bad what they tell of was.
@@ -30,6 +31,8 @@ pub(super) struct IssuedWarnings {
     pub(super) caught: bool,
     /// The stage in which the plane would be left
     pub(super) unstable: Option<usize>,
+    /// The deepest penetration between points of contact in rows of the present static stage, and its load factor
+    pub(super) hidden: Option<(Penetration, f64)>,
 }
 
 impl Default for IssuedWarnings {
@@ -48,6 +51,7 @@ impl Default for IssuedWarnings {
             unbalanced: false,
             caught: false,
             unstable: None,
+            hidden: None,
         }
     }
 }

@@ -112,19 +112,23 @@ impl StageRun<'_> {
         !is_known || size(model, &correction) > MOVED
     }
 
-    /// Warns of a static stage that ends with penetrations between the points of contact. Those at
-    /// such points are failures.
-    pub fn warn_of_hidden_penetration(&mut self) {
+    /// Notes penetrations between the points of contact in a state of a static stage that is shown. Those at such points
+    /// are failures.
+    pub fn look_between_points(&mut self) {
         let Some(contacts) = self.model.contacts() else { return };
-        // A stage that has not begun has its own failure.
-        if self.state.load == 0.0 {
-            return;
+        let Some(found) = contacts.hidden_penetration(self.state) else { return };
+        if self.issued.hidden.as_ref().is_none_or(|(deepest, _)| found.depth > deepest.depth) {
+            self.issued.hidden = Some((found, self.state.load));
         }
-        let Some(Penetration { contact, surface, depth, .. }) = contacts.hidden_penetration(self.state) else { return };
+    }
+
+    /// Warns of penetrations between the points of contact in a static stage.
+    pub fn warn_of_hidden_penetration(&mut self) {
+        let Some((Penetration { contact, surface, depth, .. }, load)) = self.issued.hidden.take() else { return };
         let stage = self.number + 1;
         let message = format!(
-            "stage {stage} ends with a penetration of {depth:.3e} of contact \"{contact}\" into \"{surface}\", \
-             between the points that carry forces: use more elements there"
+            "stage {stage}: contact \"{contact}\" penetrates \"{surface}\" by {depth:.3e} at load factor {load}, between \
+             the points that carry forces: use more elements there"
         );
         self.warn(WarningKind::HiddenPenetration, message);
     }
