@@ -883,6 +883,64 @@ fn leaves_share_their_load_however_little_they_bend() {
     println!("largest error: {worst:e}");
 }
 
+/// Two equal leaves with clamped roots, pressed on each other by a line load q, whose tips go from 0 to w and to -w. Both
+/// together have four times the stiffness of leaves that slide, until friction holds no more: P1 = 2 mu q r of the force
+/// P0 = 6 EI w/L^3. The loop takes 3 w P1 [1 - P1/(3 P0)]. What the springs of friction give is told.
+#[test]
+fn loops_of_leaves_that_lose_too_little_are_told() {
+    let mut random = Random::new(31);
+    let mut worst = 0.0f64;
+    for case in 0..6 {
+        let [length, bending] = [10f64.powf(random.range(-1.0, 1.0)), 10f64.powf(random.range(-2.0, 3.0))];
+        let radius = length * random.range(0.004, 0.0075);
+        let friction = random.range(0.1, 0.5);
+        let (order, elements) = [(1, 60), (2, 40), (3, 20)][case % 3];
+        let way = 0.02 * length;
+        let free = 6.0 * bending * way / length.powi(3);
+        let slip = free * random.range(0.1, 0.7);
+        let press = slip / (2.0 * friction * radius);
+        let leaf = |name: &str, side: f64| {
+            format!(
+                "[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = [[0, 0, {z}], [{length}, 0, {z}]]\n\
+                 elements = {elements}\norder = {order}\n[[support]]\nat = \"{name}@start\"\nfix = \"all\"\n\
+                 [[load]]\nalong = \"{name}\"\nframe = \"body\"\nforce = [0, 0, {}]\n",
+                -side * press,
+                z = side * radius,
+            )
+        };
+        let axial = 3.0 * bending / (radius * radius);
+        let text = |stick: f64| {
+            format!(
+                "[effects]\nplanar = true\n[section.s]\nEA = {axial}\nGA = {}\nGJ = {bending}\nEI = {bending}\n{}{}\
+                 [history.h]\ntimes = [0, 0.3333333333333333, 1]\nvalues = [0, 1, -1]\n\
+                 [[motion]]\nat = \"u@end\"\nuz = {way}\nhistory = {{ name = \"h\", stages = [2] }}\n\
+                 [[contact]]\nname = \"k\"\nbeams = [\"u\"]\nwith = [\"l\"]\nradius = {radius}\nfriction = {friction}\n\
+                 stick = {stick}\nends = \"none\"\n[[stage]]\nkind = \"static\"\nsteps = 1\n\
+                 [[stage]]\nkind = \"static\"\nsteps = 36\n[output]\nnodes = []\ncolumns = [\"energy\"]\n",
+                100.0 * axial,
+                leaf("u", 1.0),
+                leaf("l", -1.0),
+            )
+        };
+        let exact = 3.0 * way * slip * (1.0 - slip / (3.0 * free));
+        let [soft, firm] = [1.0, 100.0].map(|stick| simulate(&text(stick)));
+        let [lost, of_firm] = [&soft, &firm].map(|run| 1.0 - run.end("energy.friction") / exact);
+        let is_told = |run: &Simulation| {
+            run.counters.findings.warnings.iter().any(|warning| warning.kind == WarningKind::SoftStick)
+        };
+        println!(
+            "order {order}, P1/P0 {:.2}: {lost:.3}, told {}; {of_firm:.3}, told {}",
+            slip / free,
+            is_told(&soft),
+            is_told(&firm)
+        );
+        assert!(is_told(&soft) || lost < 0.1, "{lost}\n{}", text(1.0));
+        assert!(of_firm < 0.1 && !is_told(&firm), "{of_firm}\n{}", text(100.0));
+        worst = worst.max(lost);
+    }
+    assert!(worst > 0.2, "{worst}");
+}
+
 /// Turns of a coil that are apart by a diameter have no place in the tangent; those that are all but in contact have.
 #[test]
 fn turns_that_are_apart_are_not_listed() {

@@ -33,6 +33,25 @@ pub(super) struct IssuedWarnings {
     pub(super) unstable: Option<usize>,
     /// The deepest penetration between points of contact in rows of the present static stage, and its load factor
     pub(super) hidden: Option<(Penetration, f64)>,
+    /// What friction holds together in rows of the present static stage
+    pub(super) held: HeldByFriction,
+}
+
+/// Energies in rows of a static stage with friction.
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+pub(super) struct HeldByFriction {
+    /// The largest energy that springs of sticking points have stored
+    pub(super) largest: f64,
+    /// The contact of the point that has given way farthest then
+    pub(super) contact: Option<String>,
+    /// The largest strain energy of rows in which that energy was not small beside it
+    pub(super) strain: f64,
+    /// The energy in springs of friction in the last row, of sliding points, too
+    pub(super) in_springs: f64,
+    /// The energy that these springs have given back from row to row
+    pub(super) given_back: f64,
+    /// What friction had taken by the first row, once there is one
+    pub(super) taken_before: Option<f64>,
 }
 
 impl Default for IssuedWarnings {
@@ -52,6 +71,7 @@ impl Default for IssuedWarnings {
             caught: false,
             unstable: None,
             hidden: None,
+            held: HeldByFriction::default(),
         }
     }
 }

@@ -24,8 +24,13 @@ const LOOSE_BALANCE: f64 = 1e-5;
 const MOVED: f64 = 1e-12;
 
 /// The part of the strain energy from which on the energy of elastic stick is told: leaves of a spring that are ten times
-/// too soft have 0.1, and four scenes of `decks/contact` 0.0002 to 0.025.
+/// too soft have 0.1, and scenes of `decks/contact` 0.0001 to 0.034.
 const MOST_HELD_BY_STICK: f64 = 0.05;
+/// The part of what friction takes from which on it is told that elastic stick has given back, four times for what it
+/// would have taken on the way there and back: leaves that slide to and fro have 0.08 to 0.19, and lose 14 to 27 % too little.
+const MOST_GIVEN_BACK: f64 = 0.05;
+/// The part of the strain energy that friction has to take before what it takes is judged.
+const LEAST_TAKEN: f64 = 0.1;
 /// The part of the energy of elastic stick below which strain energy is none: bodies on slopes strain nothing.
 const LEAST_STRAIN: f64 = 0.05;
 
@@ -112,10 +117,23 @@ impl StageRun<'_> {
         !is_known || size(model, &correction) > MOVED
     }
 
-    /// Notes penetrations between the points of contact in a state of a static stage that is shown. Those at such points
-    /// are failures.
-    pub fn look_between_points(&mut self) {
+    /// Notes what contacts of a static stage do in a state that is shown: how far they penetrate between their points
+    /// (penetrations at these are failures), and what energy the springs of friction store that holds.
+    pub fn look_at_contacts(&mut self) {
         let Some(contacts) = self.model.contacts() else { return };
+        let held = contacts.energy_of_holds(self.state);
+        let before = &mut self.issued.held;
+        let in_springs = contacts.energy(self.state);
+        before.given_back += (before.in_springs - in_springs).max(0.0);
+        before.in_springs = in_springs;
+        before.taken_before.get_or_insert(self.state.contacts.dissipated);
+        if held > before.largest {
+            before.largest = held;
+            before.contact = contacts.softest_stick(self.state).map(|softest| softest.contact);
+        }
+        if held > MOST_HELD_BY_STICK * before.strain {
+            before.strain = before.strain.max(self.model.energy(self.state).strain);
+        }
         let Some(found) = contacts.hidden_penetration(self.state) else { return };
         if self.issued.hidden.as_ref().is_none_or(|(deepest, _)| found.depth > deepest.depth) {
             self.issued.hidden = Some((found, self.state.load));
@@ -150,23 +168,37 @@ impl StageRun<'_> {
         self.warn(WarningKind::SoftStick, message);
     }
 
-    /// Parts that friction holds together in a static stage are stiff only as far as its springs are.
+    /// Parts that friction holds together in a static stage are stiff only as far as its springs are, and where they slide
+    /// to and fro it takes no energy while these turn round.
     pub fn warn_of_soft_stick_at_rest(&mut self) {
-        let Some(contacts) = self.model.contacts() else { return };
-        let [held, strain] = [contacts.energy_of_holds(self.state), self.model.energy(self.state).strain];
-        let is_soft = held > MOST_HELD_BY_STICK * strain && strain > LEAST_STRAIN * held;
-        let Some(ElasticStick { contact, .. }) = contacts.softest_stick(self.state).filter(|_| is_soft) else { return };
-        if std::mem::replace(&mut self.issued.soft_stick, true) {
+        let rows = std::mem::take(&mut self.issued.held);
+        let (Some(contacts), Some(contact)) = (self.model.contacts(), rows.contact) else { return };
+        let at_end = [contacts.energy_of_holds(self.state), self.model.energy(self.state).strain];
+        let of_rows = [rows.largest, rows.strain.max(at_end[1])];
+        let is_soft = |[held, strain]: &[f64; 2]| *held > MOST_HELD_BY_STICK * strain && *strain > LEAST_STRAIN * held;
+        let taken = self.state.contacts.dissipated - rows.taken_before.unwrap_or_default();
+        let missed = 4.0 * rows.given_back;
+        let told = if let Some([held, strain]) = [of_rows, at_end].into_iter().find(is_soft) {
+            let percent = 100.0 * held / strain;
+            format!(
+                "holds parts together elastically: its springs store {percent:.0} % of the strain energy, and what they hold \
+                 may be far too soft"
+            )
+        } else if missed > MOST_GIVEN_BACK * (taken + missed) && taken > LEAST_TAKEN * of_rows[1] {
+            "takes too little energy where parts slide to and fro: they stick elastically on a part of the way that is not \
+             small"
+                .into()
+        } else {
             return;
+        };
+        if !std::mem::replace(&mut self.issued.soft_stick, true) {
+            let stage = self.number + 1;
+            let message = format!(
+                "stage {stage}: friction of contact \"{contact}\" {told} (use more elements, or give the contact a larger \
+                 `stiffness` or `stick`)"
+            );
+            self.warn(WarningKind::SoftStick, message);
         }
-        let stage = self.number + 1;
-        let percent = 100.0 * held / strain;
-        let message = format!(
-            "stage {stage} ends with parts that friction of contact \"{contact}\" holds together elastically: its springs \
-             store {percent:.0} % of the strain energy, and what they hold may be far too soft (use more elements, or give \
-             the contact a larger `stiffness`)"
-        );
-        self.warn(WarningKind::SoftStick, message);
     }
 
     /// A stage that ends at rest takes kinetic energy away from what moved before.

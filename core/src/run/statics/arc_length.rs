@@ -242,7 +242,7 @@ impl Follower<'_, '_> {
         self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
         self.stage.accept()?;
         self.stage.counters.steps += 1;
-        self.stage.look_between_points();
+        self.stage.look_at_contacts();
         let kind = match target {
             Some(PathTarget::Limit) => Some(EventKind::Limit),
             Some(PathTarget::Turning) => Some(EventKind::Turning),

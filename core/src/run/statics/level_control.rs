@@ -146,7 +146,7 @@ impl<'s, 'r> LevelControl<'s, 'r> {
             let reached = self.reach(number as f64 / steps as f64)?;
             if reached == Reached::Level {
                 self.stage.counters.steps += 1;
-                self.stage.look_between_points();
+                self.stage.look_at_contacts();
                 self.stage.show()?;
             }
             if reached == Reached::Over || self.stage.is_over() {
