@@ -325,6 +325,51 @@ fn free_beams_in_rotating_frames_keep_their_modes() {
     }
 }
 
+/// Pretwisted blades that point to the axis of their frame, which presses them until some of their motions grow: all
+/// others are there, whatever the mesh.
+#[test]
+fn modes_of_unstable_blades_in_rotating_frames_are_complete() {
+    let mut random = Random::new(92);
+    let mut unstable = 0;
+    for _ in 0..6 {
+        let [outward, axis] = random.axes();
+        let length_unit = 10f64.powf(random.range(-3.0, 3.0));
+        let (length, twist) = (random.range(1.0, 3.0), random.range(0.0, 0.5));
+        let section = [1.0, random.range(2.0, 5.0)];
+        // Between the first and the sixth load of the blade as a column under its own inertia, roughly.
+        let spin = random.range(5.0, 30.0) / length.powi(2);
+        let found = |elements: usize| {
+            modes(&format!(
+                "[section.s]\nEA = {}\nGA = {}\nGJ = {}\nEI = [{}, {}]\nrhoA = 1\nrhoJ = {}\n[[beam]]\nname = \"m\"\nsection = \"s\"\n\
+                 through = [[0, 0, 0], {}]\naxis3 = {}\ntwist = [{twist}, 0]\nelements = {elements}\norder = 3\n\
+                 [[support]]\nat = \"m@start\"\nfix = \"all\"\n\
+                 [[stage]]\nkind = \"static\"\nsteps = 2\n{frame}[[stage]]\nkind = \"modal\"\nmodes = 12\n{frame}",
+                1e6,
+                4e5,
+                3.0 * length_unit.powi(2),
+                section[0] * length_unit.powi(2),
+                section[1] * length_unit.powi(2),
+                list(Vec3([2e-2, 1e-2, 1e-2]) * length_unit.powi(2)),
+                list(outward * length * length_unit),
+                list(axis),
+                frame = format_args!(
+                    "frame = {{ spin = {}, about = {} }}\n",
+                    list(axis * (spin / length_unit)),
+                    list(outward * 1.4 * length * length_unit)
+                ),
+            ))
+        };
+        let [coarse, fine] = [12, 30].map(found);
+        unstable += usize::from(coarse.iter().any(|mode| mode.growth > 0.0));
+        assert!(coarse.len() >= 12 && fine.len() >= 12, "{coarse:?} {fine:?}");
+        for (a, b) in coarse.iter().zip(&fine).take(12) {
+            let [a, b] = [a, b].map(|mode| Complex::new(mode.growth, mode.omega));
+            assert!((a - b).norm() < 1e-3 * b.norm(), "{a} for {b}: {coarse:?} {fine:?}");
+        }
+    }
+    assert!(unstable > 3, "{unstable}");
+}
+
 /// An open chain of slender bars on joints, clamped at its start, with the number of freedoms of its joints; `damping`:
 /// of the rate of strain, a time for bars of length 1.
 fn chain_of_bars(random: &mut Random, damping: f64) -> (String, usize) {

@@ -40,6 +40,10 @@ const NEGLIGIBLE_RATE: f64 = 1e-12;
 /// Sweeps for the eigenvalues of a small symmetric matrix, at most.
 const MOST_EIGENVALUE_SWEEPS: usize = 1000;
 
+/// Factor by which a rate is raised until K + rate^2 M is positive definite, and how often.
+const RAISE: f64 = 4.0;
+const MOST_RAISES: i32 = 20;
+
 /// Inverse iterations after which the slowest motion prevails.
 const INVERSE_ITERATIONS: usize = 3;
 
@@ -175,6 +179,9 @@ pub struct ModeSearch<'a> {
     is_ready: bool,
     /// Number of negative pivots of K + shift^2 M, for symmetric K
     negative: Option<usize>,
+    /// A square of a rate for which the energies of K + square M are positive, where such a one is known: zero if
+    /// `negative` is
+    raised: Option<f64>,
     /// Number of factorisations so far
     pub(crate) factorisations: u64,
 }
@@ -260,6 +267,7 @@ impl<'a> ModeSearch<'a> {
             shift: 0.0,
             is_ready: false,
             negative: None,
+            raised: None,
             factorisations: 0,
         };
         let has_mass = |motion: &Vec<f64>| {
@@ -385,6 +393,7 @@ impl<'a> ModeSearch<'a> {
         if matches!(self.form, ProblemForm::Gyroscopic | ProblemForm::General) {
             self.matrices.combine_squared(shift * shift, &mut self.system.values);
             self.negative = self.solver.negative_beside(self.system);
+            self.raised = self.raise(shift);
         }
         self.matrices.combine(shift, &mut self.system.values);
         self.system.revision += 1;
@@ -394,6 +403,21 @@ impl<'a> ModeSearch<'a> {
         }
         self.is_ready = done;
         done
+    }
+
+    /// See `raised`; from the shift on.
+    fn raise(&mut self, shift: f64) -> Option<f64> {
+        let (mut square, mut negative) = (0.0, self.negative);
+        for rate in (1..=MOST_RAISES).map(|k| shift * RAISE.powi(k)) {
+            if negative? == 0 {
+                return Some(square);
+            }
+            square = rate * rate;
+            self.matrices.combine_squared(square, &mut self.system.values);
+            self.factorisations += 1;
+            negative = self.solver.negative_beside(self.system);
+        }
+        None
     }
 
     /// Number of negative pivots of the system; `done` if its factorisation has succeeded.
@@ -467,8 +491,8 @@ impl<'a> ModeSearch<'a> {
     pub fn roughly_nearest(&mut self) -> Option<Vec<f64>> {
         let shift = self.shift;
         let form = self.form;
-        let diagonal = self.inner_product();
-        let values = roughly_largest_eigenvalues(&mut ModeOperator { search: self, diagonal })?;
+        let inner_product = self.inner_product();
+        let values = roughly_largest_eigenvalues(&mut ModeOperator { search: self, inner_product })?;
         // Only the first few are nearly right.
         let largest = self.usual_value().max(largest_of(&values));
         let is_there = |theta: &Complex<f64>| theta.norm() > NEGLIGIBLE_PART * largest;
@@ -492,17 +516,20 @@ impl<'a> ModeSearch<'a> {
         }
     }
 
-    /// See [`ModeOperator::diagonal`].
-    fn inner_product(&self) -> Vec<f64> {
-        let takes_energies = matches!(self.form, ProblemForm::Symmetric | ProblemForm::Undamped) || self.is_held();
-        if takes_energies { Vec::new() } else { self.diagonal() }
+    /// The inner product of the operator at the shift factorised last.
+    fn inner_product(&self) -> InnerProduct {
+        match (self.form, self.raised) {
+            (ProblemForm::Symmetric | ProblemForm::Undamped, _) => InnerProduct::Energies { raised: 0.0 },
+            (ProblemForm::Gyroscopic | ProblemForm::General, Some(raised)) => InnerProduct::Energies { raised },
+            (ProblemForm::Gyroscopic | ProblemForm::General, None) => InnerProduct::Diagonal(self.diagonal()),
+        }
     }
 
     /// The motions nearest to the shift factorised last, nearest first. `None` if a solution fails, or after a request to stop.
     pub fn nearest(&mut self, wanted: usize) -> Option<Nearest> {
         let room = self.room(wanted);
-        let diagonal = self.inner_product();
-        let mut operator = ModeOperator { search: self, diagonal };
+        let inner_product = self.inner_product();
+        let mut operator = ModeOperator { search: self, inner_product };
         let mut spectrum = largest_eigenvalues(&mut operator, room)?;
         if !operator.is_symmetric() {
             spectrum.mend_vectors()?;
@@ -549,12 +576,12 @@ impl<'a> ModeSearch<'a> {
         let room = self.room(wanted);
         let shift = self.shift;
         let form = self.form;
-        let diagonal = self.inner_product();
+        let inner_product = self.inner_product();
         let is_enough = |s: Complex<f64>| s.re > enough * s.norm();
         // What hardly moves may be round-off.
         let moves = |s: Complex<f64>| s.norm() > FREE_MOTION_RATIO * shift;
         let ends = |theta: Complex<f64>| Some(form.exponent(shift, theta)).is_some_and(|s| is_enough(s) && moves(s));
-        let spectrum = distinct_eigenvalues_until(&mut ModeOperator { search: self, diagonal }, room, &ends)?;
+        let spectrum = distinct_eigenvalues_until(&mut ModeOperator { search: self, inner_product }, room, &ends)?;
         let exponents: Vec<Complex<f64>> = spectrum.values.iter().map(|&theta| form.exponent(shift, theta)).collect();
         self.look_at_stiffness();
         let seems = |number: &usize| {
@@ -682,6 +709,14 @@ impl<'a> ModeSearch<'a> {
     }
 }
 
+/// An inner product of states of motion.
+enum InnerProduct {
+    /// The sum of strain and kinetic energies, of K + `raised` M where K alone is indefinite
+    Energies { raised: f64 },
+    /// With a diagonal in the place of K
+    Diagonal(Vec<f64>),
+}
+
 /// Operator whose largest eigenvalues belong to the motions with the smallest |s - shift|, with the
 /// shift e.
 ///
@@ -695,8 +730,7 @@ impl<'a> ModeSearch<'a> {
 /// a conservative A is then normal, so that round-off creates no spurious motions.
 struct ModeOperator<'s, 'a> {
     search: &'s mut ModeSearch<'a>,
-    /// Diagonal that replaces K in the inner product if strain energies are indefinite; else empty
-    diagonal: Vec<f64>,
+    inner_product: InnerProduct,
 }
 
 impl ModeOperator<'_, '_> {
@@ -745,14 +779,13 @@ impl Operator for ModeOperator<'_, '_> {
         let (first, second) = x.split_at(system.pattern.dof_map.count());
         let squared = shift * shift;
         let kinetic = |x: &[f64]| system.multiply(&matrices.mass, x).into_iter().map(|v| squared * v);
-        let mut out: Vec<f64> = match self.diagonal.is_empty() {
-            true => system
-                .multiply(&matrices.stiffness, first)
-                .into_iter()
-                .zip(kinetic(first))
-                .map(|(k, m)| k + m)
-                .collect(),
-            false => first.iter().zip(&self.diagonal).map(|(x, d)| x * d).collect(),
+        let mut out: Vec<f64> = match &self.inner_product {
+            InnerProduct::Energies { raised } => {
+                let strain = system.multiply(&matrices.stiffness, first).into_iter();
+                let part = 1.0 + raised / squared;
+                strain.zip(kinetic(first)).map(|(k, m)| k + part * m).collect()
+            }
+            InnerProduct::Diagonal(diagonal) => first.iter().zip(diagonal).map(|(x, d)| x * d).collect(),
         };
         out.extend(kinetic(second));
         out
