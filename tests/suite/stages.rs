@@ -1,7 +1,7 @@
 //! What goes through several stages: histories that belong to some of them, what jumps between them, and what cannot begin.
 
 use crate::random::Random;
-use crate::scenes::{self, frequencies};
+use crate::scenes::{self, frequencies, list};
 use crate::scenes::{attempt, refusal, simulate, warnings};
 use beamsim_core::tensor::Vec3;
 use beamsim_core::warning::WarningKind;
@@ -483,4 +483,49 @@ fn a_free_strain_that_jumps_does_its_work() {
         let told = run.counters.findings.warnings.iter().map(|warning| warning.kind);
         assert!(told.clone().all(|kind| kind != WarningKind::EnergyBalance), "{:?}", told.collect::<Vec<_>>());
     }
+}
+
+/// Centrifugal forces of a frame do work as loads do: on a blade that bends out under them, beside its weight and a
+/// force that follows it, the account closes as the square of the length of levels.
+#[test]
+fn frames_do_work() {
+    let mut random = Random::new(61);
+    for case in 0..6 {
+        let [outward, across] = random.axes();
+        let (length_unit, force_unit) = (10f64.powf(random.range(-3.0, 3.0)), 10f64.powf(random.range(-3.0, 3.0)));
+        let [spin, force] = [random.range(1.0, 3.0), random.range(0.5, 2.0)];
+        let bending = force_unit * length_unit * length_unit;
+        let off = |steps: usize| {
+            let simulation = simulate(&format!(
+                "{gravity}[section.s]\nEA = {axial}\nGA = {axial}\nGJ = {bending}\nEI = {bending}\nrhoA = {rho}\n\
+                 rhoJ = {rho_j}\n[[beam]]\nname = \"m\"\nsection = \"s\"\nthrough = [[0, 0, 0], {tip}]\nelements = 4\norder = {order}\n\
+                 [[body]]\nat = \"m@end\"\nmass = {rho}\noffset = {beside}\n[[support]]\nat = \"m@start\"\nfix = \"all\"\n\
+                 [[load]]\nat = \"m@end\"\nframe = \"body\"\nforce = [0, {force}, 0]\n[output]\nnodes = []\ncolumns = [\"energy\"]\n\
+                 [[stage]]\nkind = \"static\"\nsteps = {steps}\nframe = {{ spin = {spin}, about = {about} }}\n",
+                gravity = match case % 2 {
+                    0 => String::new(),
+                    _ => format!("gravity = {}\n", list(random_weight(outward, across) * force_unit)),
+                },
+                axial = 1e4 * force_unit,
+                rho = force_unit / length_unit,
+                rho_j = list(Vec3([2e-2, 1e-2, 1e-2]) * (force_unit * length_unit)),
+                tip = list(outward * length_unit),
+                order = 1 + case % 3,
+                beside = list(across * (0.1 * length_unit)),
+                force = force * force_unit,
+                spin = list((outward.cross(across) + outward * 0.4) * spin),
+                about = list((across * 0.2 - outward * 0.3) * length_unit),
+            ));
+            let [total, external] = ["energy.total", "energy.external"].map(|column| simulation.end(column));
+            total / external
+        };
+        let [coarse, fine] = [off(64), off(128)];
+        let falls = coarse / fine;
+        assert!(fine.abs() < 2e-3 && (3.5..4.5).contains(&falls), "{case}: {coarse:e}, {fine:e}");
+    }
+}
+
+/// A weight of about 0.3 in lengths and forces of one.
+fn random_weight(outward: Vec3, across: Vec3) -> Vec3 {
+    (outward.cross(across) - across * 0.5) * 0.3
 }

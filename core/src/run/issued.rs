@@ -33,23 +33,21 @@ pub(super) struct IssuedWarnings {
     pub(super) unstable: Option<usize>,
     /// The deepest penetration between points of contact in rows of the present static stage, and its load factor
     pub(super) hidden: Option<(Penetration, f64)>,
-    /// What friction holds together in rows of the present static stage
-    pub(super) held: HeldByFriction,
+    /// What springs of friction have given back in the present static stage
+    pub(super) turns: FrictionTurns,
 }
 
-/// Energies in rows of a static stage with friction.
+/// The energy of springs of friction in rows of a static stage.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
-pub(super) struct HeldByFriction {
-    /// The largest energy that springs of sticking points have stored
-    pub(super) largest: f64,
-    /// The contact of the point that has given way farthest then
-    pub(super) contact: Option<String>,
-    /// The largest strain energy of rows in which that energy was not small beside it
-    pub(super) strain: f64,
-    /// The energy in springs of friction in the last row, of sliding points, too
+pub(super) struct FrictionTurns {
+    /// The energy in them in the last row
     pub(super) in_springs: f64,
-    /// The energy that these springs have given back from row to row
+    /// The energy that they have given back from row to row
     pub(super) given_back: f64,
+    /// The largest strain energy of rows by which they have given some back
+    pub(super) strain: f64,
+    /// The contact of the point that had given way farthest in the last of these rows in which one stuck
+    pub(super) contact: Option<String>,
     /// What friction had taken by the first row, once there is one
     pub(super) taken_before: Option<f64>,
 }
@@ -71,7 +69,7 @@ impl Default for IssuedWarnings {
             caught: false,
             unstable: None,
             hidden: None,
-            held: HeldByFriction::default(),
+            turns: FrictionTurns::default(),
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::energy::is_unbalanced;
 use super::failure::Moment;
 use super::findings::Warning;
+use super::issued::FrictionTurns;
 use super::stage_run::StageRun;
 use crate::effect::{ElasticStick, Penetration, RoundOff};
 use crate::interrupt;
@@ -118,22 +119,19 @@ impl StageRun<'_> {
     }
 
     /// Notes what contacts of a static stage do in a state that is shown: how far they penetrate between their points
-    /// (penetrations at these are failures), and what energy the springs of friction store that holds.
+    /// (penetrations at these are failures), and what energy the springs of friction give back.
     pub fn look_at_contacts(&mut self) {
         let Some(contacts) = self.model.contacts() else { return };
-        let held = contacts.energy_of_holds(self.state);
-        let before = &mut self.issued.held;
         let in_springs = contacts.energy(self.state);
-        before.given_back += (before.in_springs - in_springs).max(0.0);
-        before.in_springs = in_springs;
-        before.taken_before.get_or_insert(self.state.contacts.dissipated);
-        if held > before.largest {
-            before.largest = held;
-            before.contact = contacts.softest_stick(self.state).map(|softest| softest.contact);
+        let turns = &mut self.issued.turns;
+        let back = turns.in_springs - in_springs;
+        if back > 0.0 {
+            turns.given_back += back;
+            turns.strain = turns.strain.max(self.model.energy(self.state).strain);
+            turns.contact = contacts.softest_stick(self.state).map(|softest| softest.contact).or(turns.contact.take());
         }
-        if held > MOST_HELD_BY_STICK * before.strain {
-            before.strain = before.strain.max(self.model.energy(self.state).strain);
-        }
+        turns.in_springs = in_springs;
+        turns.taken_before.get_or_insert(self.state.contacts.dissipated);
         let Some(found) = contacts.hidden_penetration(self.state) else { return };
         if self.issued.hidden.as_ref().is_none_or(|(deepest, _)| found.depth > deepest.depth) {
             self.issued.hidden = Some((found, self.state.load));
@@ -171,25 +169,29 @@ impl StageRun<'_> {
     /// Parts that friction holds together in a static stage are stiff only as far as its springs are, and where they slide
     /// to and fro it takes no energy while these turn round.
     pub fn warn_of_soft_stick_at_rest(&mut self) {
-        let rows = std::mem::take(&mut self.issued.held);
-        let (Some(contacts), Some(contact)) = (self.model.contacts(), rows.contact) else { return };
-        let at_end = [contacts.energy_of_holds(self.state), self.model.energy(self.state).strain];
-        let of_rows = [rows.largest, rows.strain.max(at_end[1])];
-        let is_soft = |[held, strain]: &[f64; 2]| *held > MOST_HELD_BY_STICK * strain && *strain > LEAST_STRAIN * held;
-        let taken = self.state.contacts.dissipated - rows.taken_before.unwrap_or_default();
-        let missed = 4.0 * rows.given_back;
-        let told = if let Some([held, strain]) = [of_rows, at_end].into_iter().find(is_soft) {
-            let percent = 100.0 * held / strain;
-            format!(
-                "holds parts together elastically: its springs store {percent:.0} % of the strain energy, and what they hold \
-                 may be far too soft"
-            )
-        } else if missed > MOST_GIVEN_BACK * (taken + missed) && taken > LEAST_TAKEN * of_rows[1] {
-            "takes too little energy where parts slide to and fro: they stick elastically on a part of the way that is not \
-             small"
-                .into()
-        } else {
-            return;
+        let FrictionTurns { given_back, strain: of_turns, contact, taken_before, .. } =
+            std::mem::take(&mut self.issued.turns);
+        let Some(contacts) = self.model.contacts() else { return };
+        let [held, strain] = [contacts.energy_of_holds(self.state), self.model.energy(self.state).strain];
+        let is_soft = held > MOST_HELD_BY_STICK * strain && strain > LEAST_STRAIN * held;
+        let softest = contacts.softest_stick(self.state).filter(|_| is_soft);
+        let [taken, missed] = [self.state.contacts.dissipated - taken_before.unwrap_or_default(), 4.0 * given_back];
+        let loses = missed > MOST_GIVEN_BACK * (taken + missed) && taken > LEAST_TAKEN * strain.max(of_turns);
+        let (contact, told) = match (softest, contact.filter(|_| loses)) {
+            (Some(softest), _) => {
+                let percent = 100.0 * held / strain;
+                let told = format!(
+                    "holds parts together elastically: its springs store {percent:.0} % of the strain energy, and what they \
+                     hold may be far too soft"
+                );
+                (softest.contact, told)
+            }
+            (None, Some(contact)) => {
+                let told = "takes too little energy where parts slide to and fro: they stick elastically on a part of the way \
+                            that is not small";
+                (contact, told.into())
+            }
+            (None, None) => return,
         };
         if !std::mem::replace(&mut self.issued.soft_stick, true) {
             let stage = self.number + 1;

@@ -43,12 +43,15 @@ pub struct Entry<'a> {
     system: &'a System,
     /// The forces of a linear stage; `None` in other stages
     linear: Option<&'a LinearisedSystem>,
+    /// True in a rotating frame, whose centrifugal forces are loads
+    is_rotating: bool,
 }
 
 impl<'a> Entry<'a> {
     /// A state with its forces in `assembly`.
     pub fn new(model: &'a Model, state: &'a State, assembly: &'a Assembly) -> Self {
-        Self { model, state, system: &assembly.system, linear: assembly.linear() }
+        let is_rotating = assembly.stage.rotating;
+        Self { model, state, system: &assembly.system, linear: assembly.linear(), is_rotating }
     }
 
     fn energy(&self) -> Energy {
@@ -62,6 +65,19 @@ impl<'a> Entry<'a> {
     /// The strain energy.
     pub fn strain(&self) -> f64 {
         self.energy().strain
+    }
+
+    /// The force from outside at a slot: loads, centrifugal forces of a rotating frame, and the forces that hold or move
+    /// constrained directions.
+    fn outside(&self, slot: usize) -> Vec3 {
+        let Self { system, is_rotating, .. } = *self;
+        let dof_map: &DofMap = &system.pattern.dof_map;
+        let load = system.part_of(Category::External, slot);
+        let load = if is_rotating { load + system.part_of(Category::Inertia, slot) } else { load };
+        match dof_map.is_plain(slot as Slot) {
+            true => -load,
+            false => dof_map.held_part(slot as Slot, system.total(slot)) - load,
+        }
     }
 
     fn drives(&self) -> Vec<Drive> {
@@ -104,7 +120,7 @@ impl Bookkeeper {
         let Waypoint { is_passed, q, force, drag, drives } = &mut self.middle;
         *is_passed = true;
         threads::copy(q, &state.q);
-        copy_outside(system, state.q.len(), force);
+        copy_outside(&entry, force);
         threads::copy(drag, &system.force[Category::Damping as usize]);
         // The forces of contacts in the middle are not remembered.
         *drives = if entry.model.contacts().is_some() { Vec::new() } else { entry.drives() };
@@ -149,30 +165,29 @@ impl Bookkeeper {
 
     /// Opens a stage: energies are taken, with the work of free strains that jump where it begins.
     pub fn open(&mut self, entry: Entry) {
-        let Entry { state, system, .. } = entry;
         let drives = entry.drives();
         if self.first.is_some() {
             let jumps = self.drives.iter().zip(&drives).filter(|(_, to)| to.acts_at_once);
             self.ledger.external += jumps.map(|(from, to)| trapezoid(from, to)).sum::<f64>();
         }
         self.drives = drives;
-        copy_outside(system, state.q.len(), &mut self.force);
+        copy_outside(&entry, &mut self.force);
         self.middle.is_passed = false;
         // Where nothing damps it is empty.
-        threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
+        threads::copy(&mut self.drag, &entry.system.force[Category::Damping as usize]);
         self.take(entry);
         self.first.get_or_insert(self.ledger.total());
     }
 
     /// Adds the work of the step that ends here.
     pub fn add_step(&mut self, entry: Entry) {
-        let Entry { model, state, system, linear } = entry;
+        let Entry { model, state, system, linear, .. } = entry;
         let Self { ledger, q, unwrapped, force, drag, middle, .. } = self;
         let through = std::mem::take(&mut middle.is_passed).then_some(&*middle);
         let (from, to) = ((&q[..], &unwrapped[..]), (&state.q[..], &state.unwrapped[..]));
         let middle = through.map(|middle| &middle.q[..]);
         let way = Way { kinds: &model.kinds, from, middle, to, is_linear: linear.is_some() };
-        ledger.external += way.work(force, through.map(|middle| &middle.force[..]), |slot| outside(system, slot));
+        ledger.external += way.work(force, through.map(|middle| &middle.force[..]), |slot| entry.outside(slot));
         ledger.damped +=
             way.work(drag, through.map(|middle| &middle.drag[..]), |slot| system.part_of(Category::Damping, slot));
         let drives = entry.drives();
@@ -282,13 +297,13 @@ impl Way<'_> {
 }
 
 /// Copies the forces from outside at all slots.
-fn copy_outside(system: &System, slots: usize, to: &mut Vec<Vec3>) {
-    if to.len() != slots {
-        *to = zeros(slots);
+fn copy_outside(entry: &Entry, to: &mut Vec<Vec3>) {
+    if to.len() != entry.state.q.len() {
+        *to = zeros(entry.state.q.len());
     }
     threads::each_part(to, |start, part| {
         for (slot, force) in (start..).zip(part) {
-            put(force, outside(system, slot));
+            put(force, entry.outside(slot));
         }
     });
 }
@@ -302,17 +317,6 @@ fn put(place: &mut Vec3, force: Vec3) -> Vec3 {
         *place = force;
     }
     before
-}
-
-/// The force from outside at a slot: loads, and the forces that hold or move constrained
-/// directions.
-fn outside(system: &System, slot: usize) -> Vec3 {
-    let dof_map: &DofMap = &system.pattern.dof_map;
-    let external = system.part_of(Category::External, slot);
-    match dof_map.is_plain(slot as Slot) {
-        true => -external,
-        false => dof_map.held_part(slot as Slot, system.total(slot)) - external,
-    }
 }
 
 /// The rates at the start, in the middle and at the end of what goes to `middle` and to `end`, over

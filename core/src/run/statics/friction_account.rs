@@ -53,7 +53,7 @@ pub(super) struct FrictionAccount {
 impl FrictionAccount {
     /// At the present state of a stage, whose forces are known.
     pub fn open(stage: &StageRun) -> Self {
-        let books_all = !stage.is_linear() && !stage.stage().rotating && stage.state.fading.is_empty();
+        let books_all = !stage.is_linear() && stage.state.fading.is_empty();
         let bookkeeper = (stage.rubs() && books_all).then(|| {
             let mut bookkeeper = Bookkeeper::default();
             bookkeeper.open(Entry::new(stage.model, stage.state, &stage.assembly));
