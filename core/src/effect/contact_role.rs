@@ -164,6 +164,8 @@ pub struct Penetration {
     pub(crate) slot: Slot,
     /// Its depth, a length
     pub(crate) depth: f64,
+    /// The depth that is allowed
+    pub(crate) allowed: f64,
 }
 
 /// A point with friction; vectors in the axes of what carries the surface.

@@ -39,6 +39,8 @@ pub struct Attempts {
     pub(super) touches: bool,
     /// Beams touch beams there.
     pub(crate) beams_touch: bool,
+    /// There are elements of order 2 or 3.
+    pub(super) curved: bool,
     /// There are contacts that may touch.
     pub(super) may_touch: bool,
 }

@@ -92,7 +92,7 @@ impl<'a> Has<'a> {
             return format!("smaller steps were tried: {}", any_of(cures));
         }
         if tried.touches {
-            return self.hint_of_contact(tried.beams_touch);
+            return self.hint_of_contact(tried);
         }
         if work.load_levels().is_some() && work.follows_path() {
             return "shorter increments were tried: the mesh may be too coarse where the curvature is largest, or a \
@@ -131,7 +131,7 @@ impl<'a> Has<'a> {
     }
 
     /// A cure where contacts touch and a load level fails.
-    fn hint_of_contact(&self, beams_touch: bool) -> String {
+    fn hint_of_contact(&self, tried: &Attempts) -> String {
         let cures = any_of([
             Some("prescribe its motion in place of the load".to_string()),
             self.fall().map(|_| "let it slide in a dynamic stage".to_string()),
@@ -140,11 +140,13 @@ impl<'a> Has<'a> {
             self.levels(),
             Some("use a smaller `stiffness` of the contact".into()),
             self.has_beams().then(|| "use more `elements` near the contact".into()),
+            (tried.beams_touch && tried.curved)
+                .then(|| "use `order = 1` where beams wrap around each other, with more `elements`".into()),
         ]);
         format!(
             "smaller load levels and softer contacts were tried: a part that slides under a load which friction cannot \
              hold has no balance ({cures}); otherwise {others}{}",
-            if beams_touch {
+            if tried.beams_touch {
                 "; beams side by side that are pressed together need room at their ends, and slide off each other \
                  without friction"
             } else {

@@ -31,6 +31,7 @@ impl StageRun<'_> {
                     soft: self.soft,
                     touches: self.good.contacts.touches(),
                     beams_touch: !self.good.contacts.pairs.points.is_empty(),
+                    curved: self.charted.elements.iter().any(|element| element.rotations().len() > 2),
                     may_touch: self.model.contacts().is_some(),
                 },
             },

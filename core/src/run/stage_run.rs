@@ -158,7 +158,7 @@ impl StageRun<'_> {
         // Modes and buckling leave contacts as they are.
         let before = (0..self.number).rev().find(|&stage| self.plan.stages[stage].work.kind().advances_state());
         let begins = |amplitude: usize| before.is_none_or(|before| !self.model.amplitudes[amplitude].acts_in(before));
-        let Some(Penetration { contact, surface, slot, depth }) = contacts.penetrates(self.state, &begins) else {
+        let Some(Penetration { contact, surface, slot, depth, .. }) = contacts.penetrates(self.state, &begins) else {
             return Ok(());
         };
         let node = self.model.node_at(slot as usize);

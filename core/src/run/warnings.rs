@@ -140,11 +140,14 @@ impl StageRun<'_> {
 
     /// Warns of penetrations between the points of contact in a static stage.
     pub fn warn_of_hidden_penetration(&mut self) {
-        let Some((Penetration { contact, surface, depth, .. }, load)) = self.issued.hidden.take() else { return };
+        let Some((Penetration { contact, surface, depth, allowed, .. }, load)) = self.issued.hidden.take() else {
+            return;
+        };
         let stage = self.number + 1;
         let message = format!(
-            "stage {stage}: contact \"{contact}\" penetrates \"{surface}\" by {depth:.3e} at load factor {load}, between \
-             the points that carry forces: use more elements there"
+            "stage {stage}: contact \"{contact}\" penetrates \"{surface}\" by {depth:.3e}, {:.2} times `penetration`, at load \
+             factor {load}, between the points that carry forces: use more elements there, or allow it",
+            depth / allowed
         );
         self.warn(WarningKind::HiddenPenetration, message);
     }

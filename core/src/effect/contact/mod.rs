@@ -644,12 +644,7 @@ impl Contacts for SurfaceContacts {
                 let depth = -point.state.gap;
                 let is_deepest = deepest.as_ref().is_none_or(|deepest| depth > deepest.depth);
                 if depth > chain.laws.penetration && is_deepest {
-                    deepest = Some(Penetration {
-                        contact: chain.laws.name.clone(),
-                        surface: chain.surface.name.clone(),
-                        slot: chain.slot_of(point.candidate),
-                        depth,
-                    });
+                    deepest = Some(penetration(chain.laws, chain.surface, chain.slot_of(point.candidate), depth));
                 }
             });
         });
@@ -663,7 +658,7 @@ impl Contacts for SurfaceContacts {
             let Some((node, depth)) = lost.or_else(crossing) else { continue };
             if deepest.as_ref().is_none_or(|deepest| depth > deepest.depth) {
                 let slot = chain.nodes[node].node.u;
-                deepest = Some(Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth });
+                deepest = Some(penetration(laws, surface, slot, depth));
             }
         }
         deeper(deepest, self.pairs().penetrates(at, begins))
@@ -676,7 +671,7 @@ impl Contacts for SurfaceContacts {
             let is_deepest = deepest.as_ref().is_none_or(|deepest| depth > deepest.depth);
             if depth > TOLD_PENETRATION * laws.penetration && is_deepest {
                 let slot = chain.nodes[chain.nodes.len() / 2].node.u;
-                deepest = Some(Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth });
+                deepest = Some(penetration(laws, surface, slot, depth));
             }
         }
         deeper(deepest, self.pairs().hidden_penetration(at))
@@ -767,6 +762,11 @@ impl Contacts for SurfaceContacts {
         let of_pairs = self.pairs().force_along(beam, fraction, at);
         [normal + of_pairs[0], friction + of_pairs[1]]
     }
+}
+
+/// A penetration into a surface.
+fn penetration(laws: &ContactLaws, surface: &SceneSurface, slot: Slot, depth: f64) -> Penetration {
+    Penetration { contact: laws.name.clone(), surface: surface.name.clone(), slot, depth, allowed: laws.penetration }
 }
 
 /// The deeper one of two penetrations.

@@ -204,6 +204,7 @@ impl<'a> PairRole<'a> {
             surface: self.pairs.names[second].clone(),
             slot: self.slot_of(&pair),
             depth,
+            allowed: laws.penetration,
         }
     }
 
