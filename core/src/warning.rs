@@ -111,6 +111,8 @@ warning_kinds! {
     NoStartAccelerations: "no_start_accelerations", Time;
     /// A motion begins with a velocity.
     VelocityJump: "velocity_jump", Deck;
+    /// A beam spins about its own axis without inertia.
+    LooseSpin: "loose_spin", Deck;
     /// Tubes that hold the same beam within them block each other.
     BlockedTubes: "blocked_tubes", Deck;
     /// A history jumps from one stage to the next.

@@ -296,6 +296,20 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
     }
 }
 
+/// Warns of beams that bend more easily about one axis than about another, and turn about their own axis without inertia.
+pub fn warn_of_loose_spins(beams: &[String], deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    for beam in deck.beams.iter().filter(|beam| beams.contains(&beam.name.value)) {
+        let message = format!(
+            "nothing resists a spin of the beam `{}` about its own axis, and it has no inertia about it: where it bends it \
+             turns at once, in leaps, or steps fail",
+            beam.name.value
+        );
+        let help = "give its section rotary inertia, `rhoJ`: of a solid section `rhoA` times the squares of its radii of \
+                    gyration";
+        diagnostics.push(Diagnostic::warning(WarningKind::LooseSpin, message, beam.name.span.clone()).help(help));
+    }
+}
+
 /// The stiffness of a beam against stretching and shear, over its bending stiffness and with its length, from
 /// which round-off of the first is felt in the second: more than a thousandth of it.
 const EXTREME_STIFFNESS: f64 = 1e13;

@@ -361,6 +361,9 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();
     let (plane, planar) = planar::plane(deck, &model, &mesh, &initial, diagnostics);
     model.plane = plane;
+    if model.plane.is_none() {
+        check::warn_of_loose_spins(&composition.loose_spins, deck, diagnostics);
+    }
     let plan = Plan {
         energy: output::needs(deck, Need::EnergyAccount),
         continued: output::needs(deck, Need::ContinuedRotations),

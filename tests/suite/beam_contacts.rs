@@ -883,6 +883,32 @@ fn leaves_share_their_load_however_little_they_bend() {
     println!("largest error: {worst:e}");
 }
 
+/// Friction takes too little energy at reversals, by what the run says.
+fn loses_at_reversals(run: &Simulation) -> bool {
+    let mut soft = run.counters.findings.warnings.iter().filter(|warning| warning.kind == WarningKind::SoftStick);
+    soft.any(|warning| warning.message.contains("to and fro"))
+}
+
+/// A body that is pressed on a plane, dragged one way by a tenth of its radius, and lifted off turns nowhere.
+#[test]
+fn what_slides_one_way_and_lifts_off_loses_nothing() {
+    for dragged in [0.01, 0.1] {
+        let run = simulate(&format!(
+            "[point]\np = [0, 0, 0.1]\n[[body]]\nat = \"p\"\nmass = 1\n[[spring]]\nat = \"p\"\nstiffness = [0, 0, 100, 0, 0, 0]\n\
+             [[support]]\nat = \"p\"\nfix = [\"uy\", \"rx\", \"ry\", \"rz\"]\n[history.press]\ntimes = [0, 0.2, 0.6, 1]\n\
+             values = [0, 1, 1, -1]\n[history.drag]\ntimes = [0, 0.2, 0.6, 1]\nvalues = [0, 0, 1, 1]\n\
+             [[load]]\nat = \"p\"\nforce = [0, 0, -10]\nhistory = \"press\"\n\
+             [[motion]]\nat = \"p\"\nux = {dragged}\nhistory = \"drag\"\n\
+             [[surface]]\nname = \"floor\"\nkind = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n\
+             [[contact]]\nname = \"c\"\nnodes = [\"p\"]\nsurfaces = [\"floor\"]\nradius = 0.1\nfriction = 0.3\nstiffness = 1e4\n\
+             [[stage]]\nkind = \"static\"\nsteps = 20\n[output]\nnodes = [\"p\"]\ncolumns = [\"u\", \"energy\"]\n"
+        ));
+        let (taken, up) = (run.end("energy.friction"), run.end("p.uz"));
+        assert!(up > 0.05 && taken > 2.0 * dragged, "{up} {taken}");
+        assert!(!loses_at_reversals(&run), "{dragged}");
+    }
+}
+
 /// Two equal leaves with clamped roots, pressed on each other by a line load q, whose tips go from 0 to w and to -w. Both
 /// together have four times the stiffness of leaves that slide, until friction holds no more: P1 = 2 mu q r of the force
 /// P0 = 6 EI w/L^3. The loop takes 3 w P1 [1 - P1/(3 P0)]. What the springs of friction give is told.
@@ -923,19 +949,16 @@ fn loops_of_leaves_that_lose_too_little_are_told() {
             )
         };
         let exact = 3.0 * way * slip * (1.0 - slip / (3.0 * free));
-        let [soft, firm] = [1.0, 100.0].map(|stick| simulate(&text(stick)));
+        let [soft, firm] = [1.0, 10.0].map(|stick| simulate(&text(stick)));
         let [lost, of_firm] = [&soft, &firm].map(|run| 1.0 - run.end("energy.friction") / exact);
-        let is_told = |run: &Simulation| {
-            run.counters.findings.warnings.iter().any(|warning| warning.kind == WarningKind::SoftStick)
-        };
         println!(
             "order {order}, P1/P0 {:.2}: {lost:.3}, told {}; {of_firm:.3}, told {}",
             slip / free,
-            is_told(&soft),
-            is_told(&firm)
+            loses_at_reversals(&soft),
+            loses_at_reversals(&firm)
         );
-        assert!(is_told(&soft) || lost < 0.1, "{lost}\n{}", text(1.0));
-        assert!(of_firm < 0.1 && !is_told(&firm), "{of_firm}\n{}", text(100.0));
+        assert!(loses_at_reversals(&soft) || lost < 0.1, "{lost}\n{}", text(1.0));
+        assert!(of_firm < 0.1 && !loses_at_reversals(&firm), "{of_firm}\n{}", text(10.0));
         worst = worst.max(lost);
     }
     assert!(worst > 0.2, "{worst}");

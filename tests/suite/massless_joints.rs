@@ -2,7 +2,7 @@
 //! `rhoJ`. Its rotation follows the other part, and takes no momentum.
 
 use crate::random::Random;
-use crate::scenes::{Simulation, distance, list, simulate};
+use crate::scenes::{Simulation, distance, list, simulate, warnings};
 use beamsim_core::tensor::{Mat3, Vec3};
 
 /// The units of a scene: of lengths, masses and times.
@@ -118,5 +118,45 @@ fn rotations_without_inertia_take_no_momentum() {
                 assert!(lost < 1e-3, "{of}, {lost:e} of the energy");
             }
         }
+    }
+}
+
+/// Round rods without rotary inertia, pinned at one end or free, that swing in space: nothing turns them about their axis, and
+/// so they do not turn about it, whatever the scheme. Rods with unequal bending stiffness are told of.
+#[test]
+fn round_rods_without_rotary_inertia_do_not_spin() {
+    let mut random = Random::new(104);
+    for case in 0..15 {
+        let scheme = ["newmark", "hht", "generalized_alpha", "lie_generalized_alpha", "generalized_alpha"][case % 5];
+        let [outward, across] = random.axes();
+        let (length_unit, force_unit) = (10f64.powf(random.range(-2.0, 2.0)), 10f64.powf(random.range(-2.0, 2.0)));
+        let bending = 10f64.powf(random.range(-1.0, 0.6)) * force_unit * length_unit.powi(2);
+        let rod = |bending: &str| {
+            format!(
+                "gravity = {}\n[section.s]\nEA = {}\nGA = {}\nGJ = {}\nEI = {bending}\nrhoA = {}\n\
+                 [[beam]]\nname = \"c\"\nsection = \"s\"\nthrough = [[0, 0, 0], {}]\nelements = 8\norder = {}\n{}\
+                 [[initial]]\nspin = {}\n[[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.002\nscheme = \"{scheme}\"\n\
+                 [output]\nnodes = [\"c@0.5\"]\ncolumns = [\"w\", \"d\"]\n",
+                list(across * (-9.81 * length_unit)),
+                1e4 * force_unit,
+                4e3 * force_unit,
+                0.5 * force_unit * length_unit.powi(2),
+                force_unit / length_unit.powi(2),
+                list(outward * length_unit),
+                1 + case % 3,
+                if case % 5 == 4 { "" } else { "[[support]]\nat = \"c@start\"\nfix = \"pin\"\n" },
+                list((across * 0.8 + outward.cross(across)) * 1.3),
+            )
+        };
+        let run = simulate(&rod(&format!("{bending}")));
+        let [spins, axes] = ["c@0.5.w", "c@0.5.d1"].map(|name| {
+            let [x, y, z] = ["x", "y", "z"].map(|part| run.column(&format!("{name}{part}")));
+            (0..x.len()).map(|row| Vec3([x[row], y[row], z[row]])).collect::<Vec<_>>()
+        });
+        let fastest = spins.iter().zip(&axes).map(|(w, d)| w.dot(*d).abs()).fold(0.0, f64::max);
+        assert!(fastest < 0.05, "{scheme}: {fastest}\n{}", rod(&format!("{bending}")));
+        assert_eq!(run.counters.cutbacks, 0, "{scheme}");
+        let is_told = |bending: &str| warnings(&rod(bending)).iter().any(|message| message.contains("own axis"));
+        assert!(!is_told(&format!("{bending}")) && is_told(&format!("[{bending}, {}]", 3.0 * bending)));
     }
 }

@@ -103,6 +103,9 @@ pub trait Contacts {
     /// The energy of the springs by which points stick in an accepted state.
     fn energy_of_holds(&self, at: &State) -> f64;
 
+    /// The energy of the springs of friction in an accepted state, and what it is where all points slide.
+    fn energy_of_friction(&self, at: &State) -> [f64; 2];
+
     /// The point that sticks by the longest way of its spring, over its radius, in an accepted state;
     /// `None` where nothing sticks.
     fn softest_stick(&self, at: &State) -> Option<ElasticStick>;

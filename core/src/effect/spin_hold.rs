@@ -20,6 +20,8 @@ pub struct SpinningPart {
     pub axis: Vec3,
     /// GJ/L, a moment per radian
     pub torsion: f64,
+    /// The moment of drag against a spin in dynamic stages, over its rate; zero where something may turn the part
+    pub drag: f64,
     /// EA L, which has the unit of a moment per radian: the size of what resists stretching and shear
     pub stretching: f64,
 }
@@ -63,9 +65,11 @@ impl HeldIn {
 
 /// The hold of all parts that may spin freely.
 ///
-/// It has no force and does not change balance. It adds to the tangent a stiffness against
-/// corrections t.T dP about the axis t, and removes spins from predictions, so that parts spin only
-/// if forces turn them.
+/// It adds to the tangent a stiffness against corrections t.T dP about the axis t, and removes spins
+/// from predictions, so that parts spin only if forces turn them. It does not change balance but for
+/// the drag of round parts that nothing turns: the strain energy of a mesh depends a little on how
+/// such a part is turned about its bent axis, and without inertia the part would jump to where that
+/// is least, within a few steps.
 #[derive(Clone, Debug)]
 pub struct SpinHold {
     /// The parts
@@ -115,7 +119,13 @@ impl Effect for SpinHold {
             system.clear();
             let about = at.rotation(part.node.p).t.transpose_mul(part.axis);
             let hold = (ratio * part.torsion).max(LEAST_HOLD_RATIO * part.stretching);
-            system.add_tangent(0, 0, about.outer(about).scale(weights.stiffness * hold));
+            let mut resistance = weights.stiffness * hold;
+            if part.drag > 0.0 && self.held_in == HeldIn::Motion {
+                system.add_force(0, about * (part.drag * about.dot(at.v[part.node.p as usize])));
+                // Modes do not contain the spin.
+                resistance += if among_modes { 0.0 } else { weights.damping * part.drag };
+            }
+            system.add_tangent(0, 0, about.outer(about).scale(resistance));
             out.add(k, &system);
         }
     }

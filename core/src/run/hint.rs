@@ -139,9 +139,12 @@ impl<'a> Has<'a> {
         let others = any_of([
             self.levels(),
             Some("use a smaller `stiffness` of the contact".into()),
-            self.has_beams().then(|| "use more `elements` near the contact".into()),
-            (tried.beams_touch && tried.curved)
-                .then(|| "use `order = 1` where beams wrap around each other, with more `elements`".into()),
+            match tried.beams_touch && tried.curved {
+                true => Some(
+                    "use more `elements` near the contact (of `order = 1` where beams wrap around each other)".into(),
+                ),
+                false => self.has_beams().then(|| "use more `elements` near the contact".into()),
+            },
         ]);
         format!(
             "smaller load levels and softer contacts were tried: a part that slides under a load which friction cannot \

@@ -33,23 +33,23 @@ pub(super) struct IssuedWarnings {
     pub(super) unstable: Option<usize>,
     /// The deepest penetration between points of contact in rows of the present static stage, and its load factor
     pub(super) hidden: Option<(Penetration, f64)>,
-    /// What springs of friction have given back in the present static stage
-    pub(super) turns: FrictionTurns,
+    /// Where friction has turned round in the present static stage
+    pub(super) reversals: FrictionReversals,
 }
 
-/// The energy of springs of friction in rows of a static stage.
+/// The energy that elastic stick stores in rows of a static stage, and gives back where sliding turns round.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
-pub(super) struct FrictionTurns {
-    /// The energy in them in the last row
-    pub(super) in_springs: f64,
-    /// The energy that they have given back from row to row
+pub(super) struct FrictionReversals {
+    /// The energy in the springs of friction in the last row, and what it is where all points slide
+    pub(super) in_springs: [f64; 2],
+    /// The energy that they have given back, without that of points that are no longer pressed as hard
     pub(super) given_back: f64,
     /// The largest strain energy of rows by which they have given some back
     pub(super) strain: f64,
     /// The contact of the point that had given way farthest in the last of these rows in which one stuck
     pub(super) contact: Option<String>,
-    /// What friction had taken by the first row, once there is one
-    pub(super) taken_before: Option<f64>,
+    /// What friction had taken at the start of the stage
+    pub(super) taken_before: f64,
 }
 
 impl Default for IssuedWarnings {
@@ -69,7 +69,7 @@ impl Default for IssuedWarnings {
             caught: false,
             unstable: None,
             hidden: None,
-            turns: FrictionTurns::default(),
+            reversals: FrictionReversals::default(),
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::energy::is_unbalanced;
 use super::failure::Moment;
 use super::findings::Warning;
-use super::issued::FrictionTurns;
+use super::issued::FrictionReversals;
 use super::stage_run::StageRun;
 use crate::effect::{ElasticStick, Penetration, RoundOff};
 use crate::interrupt;
@@ -27,11 +27,15 @@ const MOVED: f64 = 1e-12;
 /// The part of the strain energy from which on the energy of elastic stick is told: leaves of a spring that are ten times
 /// too soft have 0.1, and scenes of `decks/contact` 0.0001 to 0.034.
 const MOST_HELD_BY_STICK: f64 = 0.05;
-/// The part of what friction takes from which on it is told that elastic stick has given back, four times for what it
-/// would have taken on the way there and back: leaves that slide to and fro have 0.08 to 0.19, and lose 14 to 27 % too little.
-const MOST_GIVEN_BACK: f64 = 0.05;
-/// The part of the strain energy that friction has to take before what it takes is judged.
-const LEAST_TAKEN: f64 = 0.1;
+/// What friction misses at a reversal, over the energy F^2/(2 k) that its springs give back there and take up again in the
+/// other direction: on that way of 2 F/k sliding takes F 2 F/k.
+const MISSED_AT_REVERSAL: f64 = 4.0;
+/// The part of what friction takes from which on it is told that it is missed at reversals: six random pairs of leaves that
+/// slide to and fro and lose 12 to 26 % too little have 0.07 to 0.19, ropes and rods that slide one way less than 0.006.
+const MOST_MISSED: f64 = 0.05;
+/// The part of the strain energy that friction has to take before what it takes is judged: ropes that settle on a drum in
+/// a few levels take less.
+const LEAST_TAKEN: f64 = 0.5;
 /// The part of the energy of elastic stick below which strain energy is none: bodies on slopes strain nothing.
 const LEAST_STRAIN: f64 = 0.05;
 
@@ -118,20 +122,28 @@ impl StageRun<'_> {
         !is_known || size(model, &correction) > MOVED
     }
 
-    /// Notes what contacts of a static stage do in a state that is shown: how far they penetrate between their points
-    /// (penetrations at these are failures), and what energy the springs of friction give back.
-    pub fn look_at_contacts(&mut self) {
+    /// Begins to look at contacts in a static stage.
+    pub fn begin_to_watch_contacts(&mut self) {
+        self.issued.hidden = None;
+        let taken_before = self.state.contacts.dissipated;
+        let in_springs = self.model.contacts().map_or([0.0; 2], |contacts| contacts.energy_of_friction(self.state));
+        self.issued.reversals = FrictionReversals { in_springs, taken_before, ..FrictionReversals::default() };
+    }
+
+    /// Notes how far contacts of a static stage penetrate between their points in a state that is shown (penetrations at
+    /// these are failures), and what energy the springs of friction give back.
+    pub fn watch_contacts(&mut self) {
         let Some(contacts) = self.model.contacts() else { return };
-        let in_springs = contacts.energy(self.state);
-        let turns = &mut self.issued.turns;
-        let back = turns.in_springs - in_springs;
+        let in_springs = contacts.energy_of_friction(self.state);
+        let reversals = &mut self.issued.reversals;
+        let back = given_back(reversals.in_springs, in_springs);
         if back > 0.0 {
-            turns.given_back += back;
-            turns.strain = turns.strain.max(self.model.energy(self.state).strain);
-            turns.contact = contacts.softest_stick(self.state).map(|softest| softest.contact).or(turns.contact.take());
+            reversals.given_back += back;
+            reversals.strain = reversals.strain.max(self.model.energy(self.state).strain);
+            let softest = contacts.softest_stick(self.state).map(|softest| softest.contact);
+            reversals.contact = softest.or(reversals.contact.take());
         }
-        turns.in_springs = in_springs;
-        turns.taken_before.get_or_insert(self.state.contacts.dissipated);
+        reversals.in_springs = in_springs;
         let Some(found) = contacts.hidden_penetration(self.state) else { return };
         if self.issued.hidden.as_ref().is_none_or(|(deepest, _)| found.depth > deepest.depth) {
             self.issued.hidden = Some((found, self.state.load));
@@ -146,7 +158,7 @@ impl StageRun<'_> {
         let stage = self.number + 1;
         let message = format!(
             "stage {stage}: contact \"{contact}\" penetrates \"{surface}\" by {depth:.3e}, {:.2} times `penetration`, at load \
-             factor {load}, between the points that carry forces: use more elements there, or allow it",
+             factor {load}, between the points that carry forces: use more elements there, or a larger `penetration`",
             depth / allowed
         );
         self.warn(WarningKind::HiddenPenetration, message);
@@ -172,14 +184,14 @@ impl StageRun<'_> {
     /// Parts that friction holds together in a static stage are stiff only as far as its springs are, and where they slide
     /// to and fro it takes no energy while these turn round.
     pub fn warn_of_soft_stick_at_rest(&mut self) {
-        let FrictionTurns { given_back, strain: of_turns, contact, taken_before, .. } =
-            std::mem::take(&mut self.issued.turns);
+        let FrictionReversals { given_back, strain: of_reversals, contact, taken_before, .. } =
+            std::mem::take(&mut self.issued.reversals);
         let Some(contacts) = self.model.contacts() else { return };
         let [held, strain] = [contacts.energy_of_holds(self.state), self.model.energy(self.state).strain];
         let is_soft = held > MOST_HELD_BY_STICK * strain && strain > LEAST_STRAIN * held;
         let softest = contacts.softest_stick(self.state).filter(|_| is_soft);
-        let [taken, missed] = [self.state.contacts.dissipated - taken_before.unwrap_or_default(), 4.0 * given_back];
-        let loses = missed > MOST_GIVEN_BACK * (taken + missed) && taken > LEAST_TAKEN * strain.max(of_turns);
+        let [taken, missed] = [self.state.contacts.dissipated - taken_before, MISSED_AT_REVERSAL * given_back];
+        let loses = missed > MOST_MISSED * (taken + missed) && taken > LEAST_TAKEN * strain.max(of_reversals);
         let (contact, told) = match (softest, contact.filter(|_| loses)) {
             (Some(softest), _) => {
                 let percent = 100.0 * held / strain;
@@ -190,8 +202,8 @@ impl StageRun<'_> {
                 (softest.contact, told)
             }
             (None, Some(contact)) => {
-                let told = "takes too little energy where parts slide to and fro: they stick elastically on a part of the way \
-                            that is not small";
+                let told = "takes too little energy where parts slide to and fro: after each reversal they first stick \
+                            elastically, on a noticeable part of the way";
                 (contact, told.into())
             }
             (None, None) => return,
@@ -254,4 +266,12 @@ impl StageRun<'_> {
             self.warn(WarningKind::LostAxis, message);
         }
     }
+}
+
+/// What springs of friction give back from one row to the next where sliding turns round. Given are their energies and those
+/// where all points slide: less pressure lowers both alike, and more of it the share of the first in the second.
+fn given_back(before: [f64; 2], after: [f64; 2]) -> f64 {
+    let share = |[energy, sliding]: [f64; 2]| if sliding > 0.0 { energy / sliding } else { 0.0 };
+    let of_share = (share(before) - share(after)) * after[1];
+    of_share.min(before[0] - after[0]).max(0.0)
 }

@@ -40,9 +40,10 @@ const NEGLIGIBLE_RATE: f64 = 1e-12;
 /// Sweeps for the eigenvalues of a small symmetric matrix, at most.
 const MOST_EIGENVALUE_SWEEPS: usize = 1000;
 
-/// Factor by which a rate is raised until K + rate^2 M is positive definite, and how often.
+/// The factor by which a rate is raised until K + rate^2 M is positive definite.
 const RAISE: f64 = 4.0;
-const MOST_RAISES: i32 = 20;
+/// How often it is raised at most: beyond 65,000 times the shift M would leave little of K.
+const MOST_RAISES: i32 = 8;
 
 /// Inverse iterations after which the slowest motion prevails.
 const INVERSE_ITERATIONS: usize = 3;
@@ -179,8 +180,8 @@ pub struct ModeSearch<'a> {
     is_ready: bool,
     /// Number of negative pivots of K + shift^2 M, for symmetric K
     negative: Option<usize>,
-    /// A square of a rate for which the energies of K + square M are positive, where such a one is known: zero if
-    /// `negative` is
+    /// What makes the energies of K + (shift^2 + `raised`) M positive, where that is known; zero if `negative` is. Square of a
+    /// rate.
     raised: Option<f64>,
     /// Number of factorisations so far
     pub(crate) factorisations: u64,
@@ -405,17 +406,21 @@ impl<'a> ModeSearch<'a> {
         done
     }
 
-    /// See `raised`; from the shift on.
+    /// The square of the first rate above the shift, if K + shift^2 M is not, for which K + rate^2 M is positive definite;
+    /// zero if it is. `None` where K is unsymmetric, or no such rate is found.
     fn raise(&mut self, shift: f64) -> Option<f64> {
-        let (mut square, mut negative) = (0.0, self.negative);
+        if self.negative? == 0 {
+            return Some(0.0);
+        }
         for rate in (1..=MOST_RAISES).map(|k| shift * RAISE.powi(k)) {
-            if negative? == 0 {
-                return Some(square);
+            if interrupt::is_requested() {
+                break;
             }
-            square = rate * rate;
-            self.matrices.combine_squared(square, &mut self.system.values);
+            self.matrices.combine_squared(rate * rate, &mut self.system.values);
             self.factorisations += 1;
-            negative = self.solver.negative_beside(self.system);
+            if self.solver.negative_beside(self.system)? == 0 {
+                return Some(rate * rate);
+            }
         }
         None
     }
@@ -519,7 +524,7 @@ impl<'a> ModeSearch<'a> {
     /// The inner product of the operator at the shift factorised last.
     fn inner_product(&self) -> InnerProduct {
         match (self.form, self.raised) {
-            (ProblemForm::Symmetric | ProblemForm::Undamped, _) => InnerProduct::Energies { raised: 0.0 },
+            (ProblemForm::Symmetric | ProblemForm::Undamped, _) => InnerProduct::Kinetic,
             (ProblemForm::Gyroscopic | ProblemForm::General, Some(raised)) => InnerProduct::Energies { raised },
             (ProblemForm::Gyroscopic | ProblemForm::General, None) => InnerProduct::Diagonal(self.diagonal()),
         }
@@ -711,7 +716,9 @@ impl<'a> ModeSearch<'a> {
 
 /// An inner product of states of motion.
 enum InnerProduct {
-    /// The sum of strain and kinetic energies, of K + `raised` M where K alone is indefinite
+    /// That of M, for operators of single size
+    Kinetic,
+    /// The sum of strain and kinetic energies, with K + (shift^2 + `raised`) M in the place of K
     Energies { raised: f64 },
     /// With a diagonal in the place of K
     Diagonal(Vec<f64>),
@@ -727,7 +734,8 @@ enum InnerProduct {
 /// ```
 ///
 /// Inner products are kinetic energies, in the general case the sum of strain and kinetic energies:
-/// a conservative A is then normal, so that round-off creates no spurious motions.
+/// a conservative A is then normal, so that round-off creates no spurious motions. Where K is indefinite it is nearly so for
+/// motions faster than those that grow.
 struct ModeOperator<'s, 'a> {
     search: &'s mut ModeSearch<'a>,
     inner_product: InnerProduct,
@@ -773,22 +781,21 @@ impl Operator for ModeOperator<'_, '_> {
 
     fn weigh(&mut self, x: &[f64]) -> Vec<f64> {
         let ModeSearch { system, matrices, shift, .. } = &*self.search;
-        if !self.is_doubled() {
-            return system.multiply(&matrices.mass, x);
-        }
-        let (first, second) = x.split_at(system.pattern.dof_map.count());
         let squared = shift * shift;
         let kinetic = |x: &[f64]| system.multiply(&matrices.mass, x).into_iter().map(|v| squared * v);
-        let mut out: Vec<f64> = match &self.inner_product {
+        let (first, second) = x.split_at(system.pattern.dof_map.count());
+        match &self.inner_product {
+            InnerProduct::Kinetic => system.multiply(&matrices.mass, x),
             InnerProduct::Energies { raised } => {
                 let strain = system.multiply(&matrices.stiffness, first).into_iter();
                 let part = 1.0 + raised / squared;
-                strain.zip(kinetic(first)).map(|(k, m)| k + part * m).collect()
+                let weighed = strain.zip(kinetic(first)).map(|(k, m)| k + part * m);
+                weighed.chain(kinetic(second)).collect()
             }
-            InnerProduct::Diagonal(diagonal) => first.iter().zip(diagonal).map(|(x, d)| x * d).collect(),
-        };
-        out.extend(kinetic(second));
-        out
+            InnerProduct::Diagonal(diagonal) => {
+                first.iter().zip(diagonal).map(|(x, d)| x * d).chain(kinetic(second)).collect()
+            }
+        }
     }
 
     fn is_symmetric(&self) -> bool {

@@ -99,6 +99,6 @@ pub struct StageContext {
     pub number: usize,
     /// Kind of the stage
     pub kind: StageKind,
-    /// True for modal stages in a rotating frame, in which one effect represents all inertia.
+    /// True for stages in a rotating frame: static, modal and buckling ones, in which one effect represents all inertia.
     pub rotating: bool,
 }

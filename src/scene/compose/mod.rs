@@ -67,6 +67,8 @@ pub struct Composition {
     pub(super) elasticity: Vec<Arc<dyn StressField>>,
     /// Surfaces and contacts, for pictures
     pub(crate) contacts: Option<Arc<SurfaceContacts>>,
+    /// Beams without inertia about their axis that turn about it at once where bending turns them in dynamic stages
+    pub(super) loose_spins: Vec<String>,
     /// Rigid bodies
     pub(super) bodies: Vec<Body>,
     /// Springs and cables between nodes
@@ -147,6 +149,7 @@ pub fn compose(
         amplitudes: Vec::new(),
         elasticity: Vec::new(),
         contacts: None,
+        loose_spins: Vec::new(),
         bodies: Vec::new(),
         links: Vec::new(),
         springs: Vec::new(),

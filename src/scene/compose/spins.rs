@@ -1,7 +1,7 @@
 //! Straight parts whose spin about their own axis nothing resists.
 
 use super::{Composer, stage_set};
-use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned};
+use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned, Stage, StageBody};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
 use beamsim_core::effect::spin_hold::{HeldIn, SpinHold, SpinningPart};
@@ -11,6 +11,10 @@ use std::collections::{BTreeMap, HashSet};
 
 /// Distance of a node from a straight line that still counts as on it, relative to the length of the line.
 const STRAIGHT: f64 = 1e-9;
+
+/// The drag against spins that nothing drives: it takes GJ/L for so many times the time of all dynamic stages to turn a
+/// part by a radian. The moments of mesh errors that would turn one are some 1e-3 of that.
+const DRAG: f64 = 10.0;
 
 /// No beam, in lists by slot.
 const NONE: usize = usize::MAX;
@@ -36,10 +40,16 @@ impl Composer<'_> {
     pub(super) fn spin_holds(&mut self, connections: &[FoundJoint]) {
         let rests = self.deck.stages.iter().any(|stage| !stage.body.kind().needs_inertia());
         let [mut in_motion, mut in_statics] = [HeldIn::Motion, HeldIn::Statics].map(|held_in| (held_in, Vec::new()));
+        let mut loose = Vec::new();
         for (resisted, stages) in self.stages_by_resistance(connections) {
             let parts = self.straight_parts(&resisted);
+            if stages.iter().any(|&stage| self.deck.stages[stage].body.kind().advances_time()) {
+                let jumps = |part: &&StraightPart| !part.is_round() && !self.has_spin_inertia(part);
+                loose.extend(parts.iter().filter(jumps).map(|part| part.beams[0].name.clone()));
+            }
             let add = |(held_in, holds): &mut (HeldIn, Vec<SpinHold>), is_free: &dyn Fn(&StraightPart) -> bool| {
-                let parts = parts.iter().filter(|part| is_free(part)).map(|part| part.hold.clone()).collect();
+                let hold = |part: &StraightPart| SpinningPart { drag: self.drag(part), ..part.hold.clone() };
+                let parts = parts.iter().filter(|part| is_free(part)).map(hold).collect();
                 let is_of_kind = |stage: &usize| HeldIn::stages_of(self.deck.stages[*stage].body.kind()) == *held_in;
                 let stages: Vec<usize> = stages.iter().copied().filter(is_of_kind).collect();
                 if !stages.is_empty() {
@@ -49,6 +59,8 @@ impl Composer<'_> {
             add(&mut in_motion, &|part| self.dynamic && !self.has_spin_inertia(part));
             add(&mut in_statics, &|part| rests && !self.feels_loads(part));
         }
+        loose.dedup();
+        self.out.loose_spins = loose;
         let parts = "straight part(s) free to spin about their own axis";
         self.hold_spins(in_motion, &format!("{parts}, without inertia about it"));
         self.hold_spins(in_statics, &format!("{parts}, which no load resists: the spin is fixed"));
@@ -133,9 +145,20 @@ impl Composer<'_> {
             nodes: nodes.iter().map(|node| node.node).collect(),
             axis,
             torsion: stiffness[3][3] / length,
+            drag: 0.0,
             stretching: stiffness[0][0] * length,
         };
         Some(StraightPart { beams, ends: [first_end.node.p, second_end.node.p], hold })
+    }
+
+    /// The drag of a part against its spin in dynamic stages; zero where something may turn it.
+    fn drag(&self, part: &StraightPart) -> f64 {
+        let rubs = self.deck.contacts.iter().any(|contact| contact.friction != [0.0; 2]);
+        if rubs || !part.is_round() || self.feels_loads(part) {
+            return 0.0;
+        }
+        let time = |stage: &Stage| if let StageBody::Dynamic { end, .. } = stage.body { end } else { 0.0 };
+        DRAG * part.hold.torsion * self.deck.stages.iter().map(time).sum::<f64>()
     }
 
     /// Something of it is turned by gravity, or resists a spin by its inertia.

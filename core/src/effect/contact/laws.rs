@@ -136,6 +136,11 @@ impl ContactLaws {
         start + (end - start) * fraction
     }
 
+    /// The largest coefficient of friction along beams.
+    pub(super) fn largest_friction(&self) -> f64 {
+        self.friction[0].max(self.friction[1])
+    }
+
     /// True if it has friction.
     pub fn rubs(&self) -> bool {
         self.friction != [0.0; 2]

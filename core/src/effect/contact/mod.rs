@@ -167,18 +167,16 @@ impl SurfaceContacts {
 
     /// The energy of elastic stick of the points in memory.
     fn stick_energy(&self, at: &State) -> f64 {
-        self.stick_energy_of(at, &|_| true)
+        self.energy_of_springs(at, &|_, point| point.carried.force.squared())
     }
 
-    /// The energy of elastic stick of some points in memory: those for which `counts` is true.
-    fn stick_energy_of(&self, at: &State, counts: &dyn Fn(&PointMemory) -> bool) -> f64 {
+    /// The energy of the springs of points in memory, with the squares of their forces.
+    fn energy_of_springs(&self, at: &State, squared: &dyn Fn(&ContactLaws, &PointMemory) -> f64) -> f64 {
         let mut energy = 0.0;
-        self.each_spring(at, &mut |_, point, stiffness| {
-            if counts(point) {
-                energy += point.weight * point.carried.force.squared() / (2.0 * stiffness);
-            }
+        self.each_spring(at, &mut |chain, point, stiffness| {
+            energy += point.weight * squared(&self.laws[chain.contact], point) / (2.0 * stiffness);
         });
-        energy + self.pairs().stick_energy(at, counts)
+        energy + self.pairs().energy_of_springs(at, squared)
     }
 
     /// Shows the points in memory of chains with friction, with the stiffness K_t of stick.
@@ -666,7 +664,9 @@ impl Contacts for SurfaceContacts {
 
     fn hidden_penetration(&self, at: &State) -> Option<Penetration> {
         let mut deepest: Option<Penetration> = None;
-        for (chain, laws, surface) in self.acting(at) {
+        for number in (0..self.chains.len()).filter(|&number| self.is_near(number, at)) {
+            let chain = &self.chains[number];
+            let (laws, surface) = (&self.laws[chain.contact], &self.surfaces[chain.surface]);
             let depth = -chain.least_gap(&surface.surface, &surface.carrier(at, Weights::NONE), at);
             let is_deepest = deepest.as_ref().is_none_or(|deepest| depth > deepest.depth);
             if depth > TOLD_PENETRATION * laws.penetration && is_deepest {
@@ -733,7 +733,12 @@ impl Contacts for SurfaceContacts {
     }
 
     fn energy_of_holds(&self, at: &State) -> f64 {
-        self.stick_energy_of(at, &PointMemory::sticks)
+        self.energy_of_springs(at, &|_, point| if point.sticks() { point.carried.force.squared() } else { 0.0 })
+    }
+
+    fn energy_of_friction(&self, at: &State) -> [f64; 2] {
+        let limit = |laws: &ContactLaws, point: &PointMemory| laws.largest_friction() * point.force;
+        [self.stick_energy(at), self.energy_of_springs(at, &|laws, point| limit(laws, point).powi(2))]
     }
 
     fn softest_stick(&self, at: &State) -> Option<ElasticStick> {

@@ -43,7 +43,7 @@ pub struct Entry<'a> {
     system: &'a System,
     /// The forces of a linear stage; `None` in other stages
     linear: Option<&'a LinearisedSystem>,
-    /// True in a rotating frame, whose centrifugal forces are loads
+    /// True in a rotating frame, whose centrifugal forces are loads. Stages with accelerations have none.
     is_rotating: bool,
 }
 

@@ -88,7 +88,6 @@ impl<'r> Analysis<'r> for ArcLength<'_, 'r> {
     fn judge(&mut self) {
         self.stage.warn_of_standstill();
         self.stage.warn_of_layers();
-        self.stage.warn_of_hidden_penetration();
     }
 }
 
@@ -242,7 +241,6 @@ impl Follower<'_, '_> {
         self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
         self.stage.accept()?;
         self.stage.counters.steps += 1;
-        self.stage.look_at_contacts();
         let kind = match target {
             Some(PathTarget::Limit) => Some(EventKind::Limit),
             Some(PathTarget::Turning) => Some(EventKind::Turning),

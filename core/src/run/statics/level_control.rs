@@ -90,6 +90,7 @@ impl LoadLevels<'_, '_> {
         let at_start = stability.signature;
         let begins_unbalanced = !self.stage.is_nearly_balanced();
         self.stage.good.copy_from(self.stage.state);
+        self.stage.begin_to_watch_contacts();
         let control = LevelControl::new(self.stage, space, levels, stability, at_start);
         LevelControl { begins_unbalanced, loose, ..control }.go(0, self.steps)
     }
@@ -146,7 +147,7 @@ impl<'s, 'r> LevelControl<'s, 'r> {
             let reached = self.reach(number as f64 / steps as f64)?;
             if reached == Reached::Level {
                 self.stage.counters.steps += 1;
-                self.stage.look_at_contacts();
+                self.stage.watch_contacts();
                 self.stage.show()?;
             }
             if reached == Reached::Over || self.stage.is_over() {

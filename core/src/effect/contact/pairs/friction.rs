@@ -142,13 +142,15 @@ impl PairRole<'_> {
         });
     }
 
-    /// The energy of elastic stick of some points in memory: those for which `counts` is true.
-    pub(in crate::effect::contact) fn stick_energy(self, at: &State, counts: &dyn Fn(&PointMemory) -> bool) -> f64 {
+    /// The energy of the springs of points in memory, with the squares of their forces.
+    pub(in crate::effect::contact) fn energy_of_springs(
+        self,
+        at: &State,
+        squared: &dyn Fn(&ContactLaws, &PointMemory) -> f64,
+    ) -> f64 {
         let mut energy = 0.0;
-        self.each_spring(at, &mut |PairPointMemory { point, .. }, stiffness| {
-            if counts(point) {
-                energy += point.weight * point.carried.force.squared() / (2.0 * stiffness);
-            }
+        self.each_spring(at, &mut |PairPointMemory { point, meeting, .. }, stiffness| {
+            energy += point.weight * squared(self.law_of(*meeting), point) / (2.0 * stiffness);
         });
         energy
     }
