@@ -1,5 +1,5 @@
 //! Motions of joints between parts of which one has no rotary inertia: a point mass, or the end of a beam without
-//! `rhoJ`. Its rotation follows the other part, and takes no momentum.
+//! `rhoJ`. Its rotation follows the other part, and takes no momentum. Spins of rods that nothing resists.
 
 use crate::random::Random;
 use crate::scenes::{Simulation, distance, list, simulate, warnings};

@@ -522,7 +522,8 @@ fn errors_of_heavy_tops_are_known() {
     }
 }
 
-/// What flies may be where it should be, and turned by a wrong angle.
+/// What flies may be where it should be, and turned by a wrong angle. Told is an estimate of 0.3 rad; of random bodies at
+/// ten and more steps a turn estimates are 0.3 to 3 times the error.
 #[test]
 fn errors_of_rotations_are_told_of_bodies_that_fly() {
     let mut random = Random::new(5);

@@ -120,7 +120,7 @@ impl Effect for SpinHold {
             let about = at.rotation(part.node.p).t.transpose_mul(part.axis);
             let hold = (ratio * part.torsion).max(LEAST_HOLD_RATIO * part.stretching);
             let mut resistance = weights.stiffness * hold;
-            if part.drag > 0.0 && self.held_in == HeldIn::Motion {
+            if part.drag > 0.0 {
                 system.add_force(0, about * (part.drag * about.dot(at.v[part.node.p as usize])));
                 // Modes do not contain the spin.
                 resistance += if among_modes { 0.0 } else { weights.damping * part.drag };

@@ -181,41 +181,46 @@ impl StageRun<'_> {
         self.warn(WarningKind::SoftStick, message);
     }
 
-    /// Parts that friction holds together in a static stage are stiff only as far as its springs are, and where they slide
-    /// to and fro it takes no energy while these turn round.
+    /// Warns of elastic stick in a static stage: what it holds at its end is soft, or what slides to and fro loses too
+    /// little.
     pub fn warn_of_soft_stick_at_rest(&mut self) {
-        let FrictionReversals { given_back, strain: of_reversals, contact, taken_before, .. } =
-            std::mem::take(&mut self.issued.reversals);
-        let Some(contacts) = self.model.contacts() else { return };
+        let reversals = std::mem::take(&mut self.issued.reversals);
+        let Some((contact, told)) = self.soft_holds().or_else(|| self.missed_by(reversals)) else { return };
+        if std::mem::replace(&mut self.issued.soft_stick, true) {
+            return;
+        }
+        let stage = self.number + 1;
+        let message = format!(
+            "stage {stage}: friction of contact \"{contact}\" {told} (use more elements, or give the contact a larger \
+             `stiffness` or `stick`)"
+        );
+        self.warn(WarningKind::SoftStick, message);
+    }
+
+    /// Parts that friction holds together are stiff only as far as its springs are: the contact, and what it does.
+    fn soft_holds(&self) -> Option<(String, String)> {
+        let contacts = self.model.contacts()?;
         let [held, strain] = [contacts.energy_of_holds(self.state), self.model.energy(self.state).strain];
         let is_soft = held > MOST_HELD_BY_STICK * strain && strain > LEAST_STRAIN * held;
-        let softest = contacts.softest_stick(self.state).filter(|_| is_soft);
+        let softest = contacts.softest_stick(self.state).filter(|_| is_soft)?;
+        let percent = 100.0 * held / strain;
+        let told = format!(
+            "holds parts together elastically: its springs store {percent:.0} % of the strain energy, and what they hold may \
+             be far too soft"
+        );
+        Some((softest.contact, told))
+    }
+
+    /// Where sliding turns round, friction takes no energy until its springs have turned round, too: the contact, and what it
+    /// does.
+    fn missed_by(&self, reversals: FrictionReversals) -> Option<(String, String)> {
+        let FrictionReversals { given_back, strain, contact, taken_before, .. } = reversals;
+        let strain = strain.max(self.model.energy(self.state).strain);
         let [taken, missed] = [self.state.contacts.dissipated - taken_before, MISSED_AT_REVERSAL * given_back];
-        let loses = missed > MOST_MISSED * (taken + missed) && taken > LEAST_TAKEN * strain.max(of_reversals);
-        let (contact, told) = match (softest, contact.filter(|_| loses)) {
-            (Some(softest), _) => {
-                let percent = 100.0 * held / strain;
-                let told = format!(
-                    "holds parts together elastically: its springs store {percent:.0} % of the strain energy, and what they \
-                     hold may be far too soft"
-                );
-                (softest.contact, told)
-            }
-            (None, Some(contact)) => {
-                let told = "takes too little energy where parts slide to and fro: after each reversal they first stick \
-                            elastically, on a noticeable part of the way";
-                (contact, told.into())
-            }
-            (None, None) => return,
-        };
-        if !std::mem::replace(&mut self.issued.soft_stick, true) {
-            let stage = self.number + 1;
-            let message = format!(
-                "stage {stage}: friction of contact \"{contact}\" {told} (use more elements, or give the contact a larger \
-                 `stiffness` or `stick`)"
-            );
-            self.warn(WarningKind::SoftStick, message);
-        }
+        let loses = missed > MOST_MISSED * (taken + missed) && taken > LEAST_TAKEN * strain;
+        let told = "takes too little energy where parts slide to and fro: after each reversal they first stick elastically, \
+                    on a noticeable part of the way";
+        Some((contact.filter(|_| loses)?, told.into()))
     }
 
     /// A stage that ends at rest takes kinetic energy away from what moved before.

@@ -67,7 +67,8 @@ pub struct Composition {
     pub(super) elasticity: Vec<Arc<dyn StressField>>,
     /// Surfaces and contacts, for pictures
     pub(crate) contacts: Option<Arc<SurfaceContacts>>,
-    /// Beams without inertia about their axis that turn about it at once where bending turns them in dynamic stages
+    /// Beams that spin freely about their own axis in dynamic stages, without inertia about it, and do not bend about all
+    /// axes alike
     pub(super) loose_spins: Vec<String>,
     /// Rigid bodies
     pub(super) bodies: Vec<Body>,

@@ -48,7 +48,11 @@ impl Composer<'_> {
                 loose.extend(parts.iter().filter(jumps).map(|part| part.beams[0].name.clone()));
             }
             let add = |(held_in, holds): &mut (HeldIn, Vec<SpinHold>), is_free: &dyn Fn(&StraightPart) -> bool| {
-                let hold = |part: &StraightPart| SpinningPart { drag: self.drag(part), ..part.hold.clone() };
+                let drag = |part: &StraightPart| match held_in {
+                    HeldIn::Motion => self.drag(part),
+                    HeldIn::Statics => 0.0,
+                };
+                let hold = |part: &StraightPart| SpinningPart { drag: drag(part), ..part.hold.clone() };
                 let parts = parts.iter().filter(|part| is_free(part)).map(hold).collect();
                 let is_of_kind = |stage: &usize| HeldIn::stages_of(self.deck.stages[*stage].body.kind()) == *held_in;
                 let stages: Vec<usize> = stages.iter().copied().filter(is_of_kind).collect();
@@ -59,7 +63,6 @@ impl Composer<'_> {
             add(&mut in_motion, &|part| self.dynamic && !self.has_spin_inertia(part));
             add(&mut in_statics, &|part| rests && !self.feels_loads(part));
         }
-        loose.dedup();
         self.out.loose_spins = loose;
         let parts = "straight part(s) free to spin about their own axis";
         self.hold_spins(in_motion, &format!("{parts}, without inertia about it"));
