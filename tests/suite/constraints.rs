@@ -88,6 +88,36 @@ fn negative_pivots_are_negative_eigenvalues_between_constraints() {
     assert!(judged > 80 && unstable > 40 && unknown < 2, "{judged} judged, {unstable} unstable, {unknown} unknown");
 }
 
+/// Bars tied by joints of all kinds, in units of length that are powers of two: digits of corrections do not depend on them, so
+/// what is put beside multipliers does not either.
+#[test]
+fn corrections_have_the_same_digits_in_every_unit_of_length() {
+    let correction = |kind: &str, unit: f64, seed: u64| {
+        let (model, mut assembly) = assembled(&bars(kind, unit, &mut Random::new(seed)));
+        let mut random = Random::new(seed);
+        let mut state = model.rest();
+        let dimension = |kind: SlotKind| match kind {
+            SlotKind::Displacement | SlotKind::Sliding | SlotKind::Moment => unit,
+            SlotKind::Rotation | SlotKind::Force => 1.0,
+        };
+        for (q, &kind) in state.q.iter_mut().zip(model.kinds.iter()) {
+            *q = random.vector(0.01 * dimension(kind));
+        }
+        assembly.evaluate(&state, Weights::STIFFNESS, None);
+        let mut solver = LinearSolver::new(&assembly.system, &model.kinds, model.length).unwrap();
+        let mut out = vec![Vec3::ZERO; model.kinds.len()];
+        assert!(solver.factorise(&assembly.system) && solver.correct(&assembly.system, false, None, &mut out));
+        out.iter().zip(model.kinds.iter()).map(|(u, &kind)| u.0.map(|u| u / dimension(kind))).collect::<Vec<_>>()
+    };
+    for (seed, kind) in (0..).zip(["rigid", "revolute", "universal", "prismatic", "cylindrical"]) {
+        let plain = correction(kind, 1.0, seed);
+        for exponent in [-30, -7, 13] {
+            let other = correction(kind, 2f64.powi(exponent), seed);
+            assert_eq!(other, plain, "{kind}, unit 2^{exponent}");
+        }
+    }
+}
+
 /// A clamped bar, a second and a third one on joints of a kind, skew in space; the last hangs on its joint alone, or is tied to ground.
 fn bars(kind: &str, unit: f64, random: &mut Random) -> String {
     let mut points = vec![Vec3::ZERO];
