@@ -3,6 +3,7 @@
 //! Functions come from the pure-Rust `libm`, so that a deck means the same numbers on every
 //! machine.
 
+use super::diagnostic::{Diagnostic, Span};
 use super::words::{Words, words};
 use std::f64::consts::PI;
 
@@ -36,6 +37,35 @@ pub struct ExpressionError {
     pub message: String,
     /// Byte offset in the expression
     pub offset: usize,
+}
+
+impl ExpressionError {
+    /// The error of a text in quotes that stands at `span` in the deck, with help where it looks like a number with a unit
+    /// or with a decimal comma.
+    pub fn diagnostic(&self, text: &str, span: &Span) -> Diagnostic {
+        let at = span.start + 1 + self.offset;
+        let message = format!("in the expression `{}`: {}", shortened(text), self.message);
+        let found = text.get(self.offset..).and_then(|rest| rest.chars().next());
+        let help = found.filter(|c| self.message == unexpected(*c)).and_then(help_behind_number);
+        Diagnostic { help: help.map(String::from), ..Diagnostic::error(message, at..at + 1) }
+    }
+}
+
+/// What helps where this character stands behind a number.
+pub fn help_behind_number(found: char) -> Option<&'static str> {
+    match found {
+        ',' => Some("decimals stand behind a point: 1.5"),
+        c if c.is_alphabetic() || "°%[".contains(c) => Some(
+            "numbers have no units: all are in one consistent system, angles in rad (\"30*deg\" is an expression); operators \
+             are + - * / ^",
+        ),
+        _ => None,
+    }
+}
+
+/// The message about a character that cannot stand there.
+fn unexpected(found: char) -> String {
+    format!("unexpected `{found}`")
 }
 
 /// Value, first and second derivative over `t`.
@@ -146,7 +176,7 @@ impl Expression {
         parser.skip_space();
         match parser.peek() {
             None => Ok(Self { instructions: parser.instructions }),
-            Some(c) => Err(parser.error(format!("unexpected `{c}`"))),
+            Some(c) => Err(parser.error(unexpected(c))),
         }
     }
 
@@ -210,7 +240,7 @@ fn finite(value: Jet, offset: usize, operation: impl Fn() -> String) -> Result<J
 }
 
 /// An expression for messages: of a long one the beginning.
-pub fn shortened(text: &str) -> String {
+fn shortened(text: &str) -> String {
     /// Characters in a message, at most.
     const MOST: usize = 60;
     match text.char_indices().nth(MOST) {
@@ -298,7 +328,7 @@ impl Parser<'_> {
             }
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_ascii_alphabetic() || c == '_' => self.name_or_call(),
-            Some(c) => Err(self.error(format!("unexpected `{c}`"))),
+            Some(c) => Err(self.error(unexpected(c))),
             None => Err(self.error("the expression is incomplete".into())),
         }
     }

@@ -1,7 +1,7 @@
 //! `[history.NAME]`, and the key `history` of the tables that it drives.
 
-use super::diagnostic::{Diagnostic, Spanned};
-use super::expression::{Expression, shortened};
+use super::diagnostic::Spanned;
+use super::expression::Expression;
 use super::point::check_name;
 use super::reader::{Context, Item, Table};
 use super::stage::read_stages;
@@ -149,9 +149,7 @@ fn read_expression(table: &Table) -> Option<Expression> {
         Ok(expression) => Some(expression),
         Err(_) if context.parameters.is_broken(&text.value) => None,
         Err(error) => {
-            let at = text.span.start + 1 + error.offset;
-            let message = format!("in the expression `{}`: {}", shortened(&text.value), error.message);
-            context.report(Diagnostic::error(message, at..at + 1));
+            context.report(error.diagnostic(&text.value, &text.span));
             None
         }
     }

@@ -66,6 +66,7 @@ pub use division::{Division, MOST_ELEMENTS};
 pub use effects::{EffectWord, Effects};
 pub use expect::{Expect, ExpectBody, Instant, Reduce, Reduction, Target};
 pub use expression::{Expression, Jet};
+use expression::help_behind_number;
 pub use files::{ImportedTable, Unreadable, fingerprint};
 pub use hints::{Hint, hint, nearest};
 pub use history::{HistoryBody, HistoryTable, HistoryUse};
@@ -225,7 +226,9 @@ fn describe_syntax(text: &str, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
         let more = (hidden > 0).then(|| format!("{hidden} more syntax error(s) may be consequences of this one"));
         let value = first.span.as_ref().and_then(|span| unquoted(text, span.start));
         let quotes = value.map(|value| format!("text and expressions stand in quotes: \"{value}\""));
-        let help: Vec<String> = quotes.into_iter().chain(more).collect();
+        let advice = || first.span.as_ref().and_then(|span| behind_number(text, span.start)).and_then(help_behind_number);
+        let advice = quotes.or_else(|| advice().map(String::from));
+        let help: Vec<String> = advice.into_iter().chain(more).collect();
         first.help = (!help.is_empty()).then(|| help.join("; "));
     }
     shown
@@ -243,6 +246,17 @@ fn unquoted(text: &str, place: usize) -> Option<&str> {
     let is_list = value.contains(',') && !value.contains('(');
     let is_word = begins && is_whole && !is_list && value.chars().all(is_expression);
     (is_word && !value.eq_ignore_ascii_case("true") && !value.eq_ignore_ascii_case("false")).then_some(value)
+}
+
+/// The first character that is no part of the number that begins the value about this place.
+fn behind_number(text: &str, place: usize) -> Option<char> {
+    let before = text.get(..place)?;
+    let line = before.rfind('\n').map_or(0, |end| end + 1);
+    let start = line + before[line..].rfind(['=', '[', ','])? + 1;
+    let value = text[start..].trim_start_matches([' ', '\t', '-', '+']);
+    let number = value.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.' || c == '_');
+    let is_number = value.starts_with(|c: char| c.is_ascii_digit() || c == '.');
+    number.trim_start_matches([' ', '\t']).chars().next().filter(|_| is_number)
 }
 
 /// The place of the key with the most dots.

@@ -1,7 +1,7 @@
 //! `[param]`: names for numbers, which may be expressions of each other.
 
 use super::diagnostic::{Diagnostic, Span};
-use super::expression::{CONSTANTS, Expression, Jet, shortened};
+use super::expression::{CONSTANTS, Expression, Jet};
 use super::reader::{kind_of, literal};
 use std::collections::{BTreeMap, BTreeSet};
 use toml::de::{DeTable, DeValue};
@@ -177,11 +177,7 @@ fn read_entry(item: &toml::Spanned<DeValue>, diagnostics: &mut Vec<Diagnostic>) 
     match Expression::parse(&text) {
         Ok(expression) => Some(expression),
         Err(error) => {
-            let at = item.span().start + 1 + error.offset;
-            diagnostics.push(Diagnostic::error(
-                format!("in the expression `{}`: {}", shortened(&text), error.message),
-                at..at + 1,
-            ));
+            diagnostics.push(error.diagnostic(&text, &item.span()));
             None
         }
     }

@@ -2,7 +2,7 @@
 //! wrong.
 
 use super::diagnostic::{Diagnostic, Span, Spanned, one_of};
-use super::expression::{Expression, shortened};
+use super::expression::Expression;
 use super::hints::{self, nearest};
 use super::parameters::Parameters;
 use super::words::Words;
@@ -65,11 +65,7 @@ impl Context {
             }
             Err(_) if self.parameters.is_broken(text) => None,
             Err(error) => {
-                let at = span.start + 1 + error.offset;
-                let mut diagnostic = Diagnostic::error(
-                    format!("in the expression `{}`: {}", shortened(text), error.message),
-                    at..at + 1,
-                );
+                let mut diagnostic = error.diagnostic(text, span);
                 if let Some(name) = error.message.strip_prefix("unknown name `").and_then(|n| n.strip_suffix('`')) {
                     diagnostic.help = Some(if name == "t" {
                         "`t` exists only in the `expr` of a history".into()
