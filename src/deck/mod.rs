@@ -65,8 +65,8 @@ pub use diagnostic::{Diagnostic, Severity, Span, Spanned, one_of};
 pub use division::{Division, MOST_ELEMENTS};
 pub use effects::{EffectWord, Effects};
 pub use expect::{Expect, ExpectBody, Instant, Reduce, Reduction, Target};
-pub use expression::{Expression, Jet};
 use expression::help_behind_number;
+pub use expression::{Expression, Jet};
 pub use files::{ImportedTable, Unreadable, fingerprint};
 pub use hints::{Hint, hint, nearest};
 pub use history::{HistoryBody, HistoryTable, HistoryUse};
@@ -226,7 +226,8 @@ fn describe_syntax(text: &str, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
         let more = (hidden > 0).then(|| format!("{hidden} more syntax error(s) may be consequences of this one"));
         let value = first.span.as_ref().and_then(|span| unquoted(text, span.start));
         let quotes = value.map(|value| format!("text and expressions stand in quotes: \"{value}\""));
-        let advice = || first.span.as_ref().and_then(|span| behind_number(text, span.start)).and_then(help_behind_number);
+        let advice =
+            || first.span.as_ref().and_then(|span| behind_number(text, span.start)).and_then(help_behind_number);
         let advice = quotes.or_else(|| advice().map(String::from));
         let help: Vec<String> = advice.into_iter().chain(more).collect();
         first.help = (!help.is_empty()).then(|| help.join("; "));
