@@ -240,7 +240,10 @@ fn unquoted(text: &str, place: usize) -> Option<&str> {
     let before = text.get(..place)?;
     let line = before.rfind('\n').map_or(0, |end| end + 1);
     let start = before[line..].find('=').map(|_| before.rfind(['=', '[']))??;
-    let value = text[start + 1..].split(['\n', '\r', ']', '#']).next()?.trim();
+    let value = |start: usize, ends: &[char]| Some(text[start + 1..].split(ends).next()?.trim());
+    let whole = value(start, &['\n', '\r', ']', '#'])?;
+    let item = value(before.rfind(['=', '[', ','])?, &['\n', '\r', ']', '#', ','])?;
+    let value = if whole.contains(',') && !item.contains(['(', ')']) { item } else { whole };
     let begins = value.trim_start_matches('-').starts_with(|c: char| c.is_ascii_alphabetic()) || value.contains('*');
     let is_expression = |c: char| c.is_ascii_alphanumeric() || " _+-*/().,^".contains(c);
     let is_whole = value.matches('(').count() == value.matches(')').count();
