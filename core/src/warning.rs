@@ -161,6 +161,8 @@ warning_kinds! {
     MasslessSection: "massless_section", Deck;
     /// A stage of fixed steps has a `step_tolerance`.
     IdleStepTolerance: "idle_step_tolerance", Deck;
+    /// Later tables of initial velocities name all nodes of an earlier one.
+    IdleInitial: "idle_initial", Deck;
     /// A key of `[cost]` varies something that the deck does not have.
     IdleCostKey: "idle_cost_key", Deck;
 }

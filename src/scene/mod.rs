@@ -49,6 +49,7 @@ use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
 use constraints::SceneConstraints;
 use output::Columns;
+use std::collections::HashSet;
 use std::sync::Arc;
 use stress::SectionStresses;
 
@@ -334,7 +335,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let stages = stages(deck, &columns, &mut found);
     let expectations = expectations(deck, &columns, &mut found);
     diagnostics.extend(stresses.warnings());
-    let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
+    let initial = initial_motions(deck, &mesh, &mut found);
     // Where a beam could not be meshed, points may seem to be no nodes: only errors about unknown
     // names are kept.
     diagnostics.extend(found.into_iter().filter(|d| complete || d.unknown.is_some()));
@@ -551,6 +552,24 @@ fn mode_quantity(name: &str) -> Option<(ModeQuantity, usize)> {
         ModeQuantity::Load => "buckling",
     })?;
     Some((quantity, digits.parse::<usize>().ok()?.checked_sub(1)?))
+}
+
+/// The initial motions, last first: a node takes that of the last table that names it. Tables that give none to any node are
+/// told.
+fn initial_motions(deck: &Deck, mesh: &Mesh, found: &mut Vec<Diagnostic>) -> Vec<InitialMotion> {
+    let mut taken = HashSet::new();
+    let mut motions = Vec::new();
+    for table in deck.initials.iter().rev() {
+        let Some(motion) = initial(deck, mesh, table, found) else { continue };
+        let given = motion.nodes.iter().filter(|(node, _)| taken.insert((node.u, node.p))).count();
+        if given == 0 {
+            let message = "all nodes of this table have a later table, and the last one applies";
+            let help = "give `velocity` and `spin` of a motion in one table";
+            found.push(Diagnostic::warning(WarningKind::IdleInitial, message, table.span.clone()).help(help));
+        }
+        motions.push(motion);
+    }
+    motions
 }
 
 fn initial(

@@ -165,6 +165,24 @@ fn warnings_about_a_deck_stand_in_its_record_without_a_moment() {
     assert_eq!(told["warnings"], record["warnings"]);
 }
 
+/// A velocity of all nodes, and the spin of one of two, or of both: the second table replaces the first one.
+#[test]
+fn initial_velocities_that_reach_no_node_are_told() {
+    let scene = |spinning: &str| {
+        format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e3\nGA = 1e3\nGJ = 10\nEI = 10\nrhoA = 1\n\
+             [[beam]]\nname = \"rod\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 1\norder = 1\n\
+             [[initial]]\nvelocity = [1, 0, 0]\n[[initial]]\n{spinning}\nspin = [0, 0, 0.1]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\n"
+        )
+    };
+    let told = |spinning: &str| -> usize {
+        let found = warnings(&scene(spinning));
+        found.iter().filter(|message| message.contains("all nodes of this table have a later table")).count()
+    };
+    assert_eq!([told("at = \"a\""), told("beam = \"rod\""), told("")], [0, 1, 1]);
+}
+
 /// Two bodies under a pulse, given as a formula: over the time of the run, and over that of the second stage.
 #[test]
 fn pulses_between_steps_are_told_by_the_clock_of_their_stages() {
