@@ -105,6 +105,8 @@ warning_kinds! {
     EnergyBalance: "energy_balance", Time;
     /// The estimated error of fixed time steps is large.
     LongSteps: "long_steps", Time;
+    /// Forces or accelerations oscillate faster than time steps resolve.
+    Ringing: "ringing", Time;
     /// A fixed step failed and was taken in smaller ones.
     StepSubdivided: "step_subdivided", Deck;
     /// Mass does not determine the accelerations at the start.

@@ -20,7 +20,7 @@ use xxhash_rust::xxh3::xxh3_64;
 const MAGIC: &[u8] = b"beamsim checkpoint\n";
 /// The version of the program, and that of the form of the file, which changes with any structure
 /// that is stored.
-const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " 20");
+const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " 21");
 /// The length of the checksum, in bytes
 const CHECKSUM: usize = 8;
 

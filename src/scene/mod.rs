@@ -367,6 +367,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     }
     let plan = Plan {
         energy: output::needs(deck, Need::EnergyAccount),
+        columns: probes.clone(),
         continued: output::needs(deck, Need::ContinuedRotations),
         model: Arc::new(model),
         initial,

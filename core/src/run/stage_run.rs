@@ -293,7 +293,7 @@ impl StageRun<'_> {
         self.observer.found(self.number + 1, result)
     }
 
-    fn snapshot(&self) -> Snapshot<'_> {
+    pub(super) fn snapshot(&self) -> Snapshot<'_> {
         Snapshot {
             stage: self.number + 1,
             state: self.state,

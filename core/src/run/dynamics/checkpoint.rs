@@ -2,6 +2,7 @@
 
 use super::adaptive::Control;
 use super::friction_impulses::FrictionImpulses;
+use super::ringing::Ringing;
 use crate::integrate::Predictor;
 use crate::run::energy::EnergyGuard;
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,7 @@ pub(in crate::run) struct DynamicsCheckpoint {
     pub(super) guard: Option<EnergyGuard>,
     /// The friction of fixed steps
     pub(super) friction: FrictionImpulses,
+    pub(super) ringing: Ringing,
     pub(super) steps: StepsCheckpoint,
 }
 

@@ -213,7 +213,7 @@ impl Excess {
 }
 
 /// A share, of which more than the whole tells nothing.
-fn percent(share: f64) -> String {
+pub(super) fn percent(share: f64) -> String {
     if share < 1.0 { format!("{:.0} %", 100.0 * share) } else { "100 % or more".into() }
 }
 

@@ -9,6 +9,7 @@ mod judgement;
 mod massless;
 mod massless_start;
 mod middle;
+mod ringing;
 mod smooth_start;
 mod start;
 mod two_stages;
@@ -18,6 +19,7 @@ use self::checkpoint::{DynamicsCheckpoint, StepsCheckpoint};
 use self::friction_impulses::FrictionImpulses;
 use self::grid::Grid;
 use self::middle::Middle;
+use self::ringing::Ringing;
 use super::checkpoint::AnalysisCheckpoint;
 use super::energy::{EnergyGuard, Growth};
 use super::failure::Failure;
@@ -64,6 +66,8 @@ pub(super) struct Dynamics<'s, 'r> {
     guard: Option<EnergyGuard>,
     /// The friction of fixed steps
     friction: FrictionImpulses,
+    /// Columns that depend on accelerations
+    ringing: Ringing,
 }
 
 impl<'s, 'r> Dynamics<'s, 'r> {
@@ -83,6 +87,7 @@ impl<'s, 'r> Dynamics<'s, 'r> {
             rateless: Vec::new(),
             guard,
             friction: FrictionImpulses::default(),
+            ringing: Ringing::default(),
             stage,
         }
     }
@@ -119,6 +124,7 @@ impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
         self.stage.warn_of_layers();
         self.judge_steps();
         self.judge_friction();
+        self.warn_of_ringing();
     }
 }
 
@@ -141,10 +147,19 @@ impl Dynamics<'_, '_> {
 
     /// Takes up the stage where a checkpoint has left it.
     fn take_up(&mut self, checkpoint: DynamicsCheckpoint) -> StepsCheckpoint {
-        let DynamicsCheckpoint { last_length, predictor, of_middle, massive, rateless, guard, friction, steps } =
-            checkpoint;
+        let DynamicsCheckpoint {
+            last_length,
+            predictor,
+            of_middle,
+            massive,
+            rateless,
+            guard,
+            friction,
+            ringing,
+            steps,
+        } = checkpoint;
         (self.last_length, self.massive, self.rateless) = (last_length, massive, rateless);
-        (self.guard, self.friction) = (guard, friction);
+        (self.guard, self.friction, self.ringing) = (guard, friction, ringing);
         self.predictor = predictor.of_model(self.stage.model);
         if let (Some(middle), Some(predictor)) = (&mut self.middle, of_middle) {
             middle.predictor = predictor.of_model(self.stage.model);
@@ -166,7 +181,7 @@ impl Dynamics<'_, '_> {
 
     /// Shows the observer where the stage is, if it wants that.
     fn offer_checkpoint(&mut self, steps: impl FnOnce() -> StepsCheckpoint) -> Result<(), Failure> {
-        let Self { stage, last_length, predictor, middle, massive, rateless, guard, friction, .. } = self;
+        let Self { stage, last_length, predictor, middle, massive, rateless, guard, friction, ringing, .. } = self;
         stage.offer_checkpoint(|| {
             AnalysisCheckpoint::Dynamics(DynamicsCheckpoint {
                 last_length: *last_length,
@@ -176,6 +191,7 @@ impl Dynamics<'_, '_> {
                 rateless: rateless.clone(),
                 guard: guard.clone(),
                 friction: *friction,
+                ringing: ringing.clone(),
                 steps: steps(),
             })
         })
@@ -462,6 +478,7 @@ impl Dynamics<'_, '_> {
         self.stage.accept()?;
         self.stage.counters.steps += 1;
         self.stage.show()?;
+        self.ringing.take(self.stage, step.length);
         self.refuse_growth()?;
         if self.stage.is_over() {
             return Ok(true);
