@@ -257,7 +257,17 @@ impl Failure {
 
 impl fmt::Display for Moment {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "stage {}, time {}, load factor {}", self.stage, self.time, self.load)
+        write!(f, "stage {}, time {}, load factor {}", self.stage, Clock(self.time), Clock(self.load))
+    }
+}
+
+/// A time or load factor in a message: with an exponent where that spares many zeros.
+pub(super) struct Clock(pub f64);
+
+impl fmt::Display for Clock {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let size = self.0.abs();
+        if size == 0.0 || (1e-6..1e15).contains(&size) { write!(f, "{}", self.0) } else { write!(f, "{:e}", self.0) }
     }
 }
 
@@ -312,7 +322,7 @@ impl fmt::Display for Failure {
                 f,
                 "load factor {goal} was not reached: load control stopped at {at}; the equilibrium path was then \
                  followed by {increments} arc-length increments, to load factor {}",
-                end.load
+                Clock(end.load)
             ),
             Self::StepTooSmall { at, place, error, share } => write!(
                 f,
