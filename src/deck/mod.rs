@@ -226,8 +226,7 @@ fn describe_syntax(text: &str, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
         let more = (hidden > 0).then(|| format!("{hidden} more syntax error(s) may be consequences of this one"));
         let value = first.span.as_ref().and_then(|span| unquoted(text, span.start));
         let quotes = value.map(|value| format!("text and expressions stand in quotes: \"{value}\""));
-        let advice =
-            || first.span.as_ref().and_then(|span| behind_number(text, span.start)).and_then(help_behind_number);
+        let advice = || first.span.as_ref().and_then(|span| help_of_number(text, span.start));
         let advice = quotes.or_else(|| advice().map(String::from));
         let help: Vec<String> = advice.into_iter().chain(more).collect();
         first.help = (!help.is_empty()).then(|| help.join("; "));
@@ -252,15 +251,18 @@ fn unquoted(text: &str, place: usize) -> Option<&str> {
     (is_word && !value.eq_ignore_ascii_case("true") && !value.eq_ignore_ascii_case("false")).then_some(value)
 }
 
-/// The first character that is no part of the number that begins the value about this place.
-fn behind_number(text: &str, place: usize) -> Option<char> {
+/// What helps if the value about this place begins as a number.
+fn help_of_number(text: &str, place: usize) -> Option<&'static str> {
     let before = text.get(..place)?;
     let line = before.rfind('\n').map_or(0, |end| end + 1);
     let start = line + before[line..].rfind(['=', '[', ','])? + 1;
     let value = text[start..].trim_start_matches([' ', '\t', '-', '+']);
-    let number = value.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.' || c == '_');
-    let is_number = value.starts_with(|c: char| c.is_ascii_digit() || c == '.');
-    number.trim_start_matches([' ', '\t']).chars().next().filter(|_| is_number)
+    let behind = value.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.' || c == '_');
+    let number = &value[..value.len() - behind.len()];
+    if number.starts_with('.') || number.ends_with('.') {
+        return Some("digits stand on both sides of the point: 0.4, 5.0");
+    }
+    behind.trim_start_matches([' ', '\t']).chars().next().filter(|_| !number.is_empty()).and_then(help_behind_number)
 }
 
 /// The place of the key with the most dots.

@@ -367,7 +367,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     }
     let plan = Plan {
         energy: output::needs(deck, Need::EnergyAccount),
-        columns: probes.clone(),
+        watched: probes.iter().filter_map(Probe::watched).collect(),
         continued: output::needs(deck, Need::ContinuedRotations),
         model: Arc::new(model),
         initial,
@@ -579,20 +579,19 @@ fn initial(
     initial: &deck::Initial,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<InitialMotion> {
-    let mut report = |diagnostic: Diagnostic| diagnostics.push(diagnostic);
     let nodes: Vec<usize> = match &initial.target {
         deck::InitialTarget::All => (0..mesh.nodes.len()).collect(),
         deck::InitialTarget::At(at) => match mesh.find_node(deck, at) {
             Ok((node, _)) => vec![node],
             Err(diagnostic) => {
-                report(diagnostic);
+                diagnostics.push(diagnostic);
                 return None;
             }
         },
         deck::InitialTarget::Beam(name) => match mesh.beams.named(&name.value) {
             Some(beam) => beam.nodes.clone(),
             None => {
-                report(names::unknown("beam", name, deck.beams.names()));
+                diagnostics.extend(names::unknown_beam(deck, name));
                 return None;
             }
         },
@@ -600,7 +599,7 @@ fn initial(
     let about = match initial.about.as_ref().map_or(Ok(Vec3::ZERO), |point| names::place(deck, point)) {
         Ok(place) => place,
         Err(diagnostic) => {
-            report(diagnostic);
+            diagnostics.push(diagnostic);
             return None;
         }
     };

@@ -59,6 +59,12 @@ pub fn unknown<'a>(kind: &str, name: &Spanned<String>, known: impl Iterator<Item
     }
 }
 
+/// "there is no beam `x`"; `None` where the deck has it: then it could not be meshed, which is told already.
+pub fn unknown_beam(deck: &Deck, name: &Spanned<String>) -> Option<Diagnostic> {
+    let is_known = deck.beams.number(&name.value).is_some();
+    (!is_known).then(|| unknown("beam", name, deck.beams.names()))
+}
+
 /// A named place on a beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spot {

@@ -2,7 +2,7 @@
 
 use crate::dual::{Dual, values, variables, with_room};
 use crate::random::Random;
-use crate::scenes::simulate;
+use crate::scenes::{attempt, simulate};
 use crate::tangents::{agree, symmetric};
 use beamsim_core::effect::joint::{FreeCoordinate, Joint, JointKind};
 use beamsim_core::effect::spring::Link;
@@ -12,6 +12,7 @@ use beamsim_core::kernel::turn::{Carrier, Start, StepCoefficients, Stretch, Turn
 use beamsim_core::kernel::volume::VolumeForce;
 use beamsim_core::kernel::{ElementSystem, Weights};
 use beamsim_core::rotation::Rotation;
+use beamsim_core::run::Failure;
 use beamsim_core::scalar::Real;
 use beamsim_core::system::{Node, State};
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -420,4 +421,22 @@ fn a_rotating_frame_sees_the_same_inertia() {
             agree(&what, &volume_tangent(&got), &weighted(forces, weights), 1e-12);
         }
     }
+}
+
+/// A motor that turns on from a stage with `until`, whose end only the run knows, and whose history goes back by more than
+/// 135 degrees where the next static stage begins: its turns could not be counted.
+#[test]
+fn motors_do_not_leap_where_static_stages_begin() {
+    let deck = |angle: f64| {
+        format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[[body]]\nat = \"b\"\nmass = 1\ninertia = [1, 1, 1]\n\
+             [[joint]]\nkind = \"revolute\"\nnodes = [\"b\"]\nat = \"a\"\naxis = [0, 0, 1]\nangle = {angle}\nhistory = \"h\"\n\
+             [history.h]\ntimes = [0, 1]\nvalues = [0, 1]\n\
+             [[stage]]\nkind = \"static\"\nsteps = 8\nuntil = {{ column = \"b.uz\", above = 1 }}\n\
+             [[stage]]\nkind = \"static\"\nsteps = 8\n[output]\nnodes = [\"b\"]\ncolumns = [\"u\", \"rc\"]\n"
+        )
+    };
+    assert!((simulate(&deck(2.0)).end("b.rz") - 2.0).abs() < 1e-9);
+    let Err(Failure::Deck(message)) = attempt(&deck(2.5)).result else { panic!("the motor leaps") };
+    assert!(message.contains("must start at 2.5 rad (143.2°), where the joint is, but starts at 0"), "{message}");
 }

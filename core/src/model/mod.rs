@@ -220,19 +220,28 @@ impl Model {
 
     /// The motors of joints that a change of amplitudes moves by more than a joint may be open.
     pub fn motor_jumps(&self, from: &[f64], state: &State) -> Vec<MotorJump> {
-        let mut jumps = Vec::new();
-        self.each_motor(state, &mut |motor| {
-            let [from, to] = [from, &state.amplitude].map(|amplitudes| motor.value * amplitudes[motor.amplitude]);
-            let (gap, size) = match motor.turns {
-                true => (nearest_angle(to - from), 1.0),
-                false => (to - from, self.length),
-            };
-            if gap.abs() > LARGEST_GAP * size {
-                let MotorState { slot, amplitude, turns, .. } = motor;
-                jumps.push(MotorJump { slot, amplitude, turns, from, to });
-            }
+        let mut jumps = self.motor_changes(from, state);
+        jumps.retain(|MotorJump { turns, from, to, .. }| match turns {
+            true => nearest_angle(to - from).abs() > LARGEST_GAP,
+            false => (to - from).abs() > LARGEST_GAP * self.length,
         });
         jumps
+    }
+
+    /// The motors of joints that a change of amplitudes turns so far that their turns cannot be counted.
+    pub fn motor_leaps(&self, from: &[f64], state: &State) -> Vec<MotorJump> {
+        let mut jumps = self.motor_changes(from, state);
+        jumps.retain(|jump| jump.turns && (jump.to - jump.from).abs() > schedule::LARGEST_TURN);
+        jumps
+    }
+
+    fn motor_changes(&self, from: &[f64], state: &State) -> Vec<MotorJump> {
+        let mut changes = Vec::new();
+        self.each_motor(state, &mut |MotorState { slot, amplitude, turns, value, .. }| {
+            let [from, to] = [from, &state.amplitude].map(|amplitudes| value * amplitudes[amplitude]);
+            changes.push(MotorJump { slot, amplitude, turns, from, to });
+        });
+        changes
     }
 
     /// The surfaces that a change of amplitudes moves at once.

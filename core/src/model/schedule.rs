@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// The angle by which a prescribed rotation may go in one step or load increment, in radians.
-const LARGEST_TURN: f64 = 0.75 * std::f64::consts::PI;
+pub(super) const LARGEST_TURN: f64 = 0.75 * std::f64::consts::PI;
 
 /// The part of a rotation vector along a held axis above which it has turned about it, in radians;
 /// and the sine above which axes differ.

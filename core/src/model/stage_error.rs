@@ -36,7 +36,7 @@ pub struct Jump {
     pub(crate) to: f64,
 }
 
-/// A motor that would have to jump when a dynamic stage begins.
+/// A motor that would have to jump when a stage begins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorJump {
     /// The slot of its multiplier

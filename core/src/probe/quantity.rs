@@ -1,6 +1,8 @@
 //! Physical quantities of columns: their units, and how their errors fall with the width of
 //! elements.
 
+use crate::run::RingingKind;
+
 /// Physical quantity of a column. Errors are measured against the largest value of the same
 /// quantity in a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -166,6 +168,41 @@ impl Quantity {
             | Self::CentreOfMass
             | Self::ContactGap
             | Self::ContactMoment
+            | Self::ContactForcePerLength
+            | Self::ContactLength
+            | Self::ContactPoints
+            | Self::AngularFrequency
+            | Self::GrowthRate
+            | Self::Stage
+            | Self::Time
+            | Self::LoadFactor => None,
+        }
+    }
+
+    /// What ringing is judged by, for quantities that depend on accelerations. Looking for the largest stress of a section
+    /// takes long; it goes with the resultants.
+    pub fn ringing_kind(self) -> Option<RingingKind> {
+        match self {
+            Self::Acceleration => Some(RingingKind::Acceleration),
+            Self::AngularAcceleration => Some(RingingKind::AngularAcceleration),
+            Self::ReactionForce | Self::SectionForce | Self::ContactForce => Some(RingingKind::Force),
+            Self::ReactionMoment | Self::SectionMoment | Self::ContactMoment => Some(RingingKind::Moment),
+            Self::Strain => Some(RingingKind::Strain),
+            Self::Curvature => Some(RingingKind::Curvature),
+            Self::Displacement
+            | Self::Position
+            | Self::Rotation
+            | Self::Orientation
+            | Self::SectionAxis
+            | Self::Velocity
+            | Self::AngularVelocity
+            | Self::Stress
+            | Self::FailureIndex
+            | Self::Energy
+            | Self::Momentum
+            | Self::AngularMomentum
+            | Self::CentreOfMass
+            | Self::ContactGap
             | Self::ContactForcePerLength
             | Self::ContactLength
             | Self::ContactPoints

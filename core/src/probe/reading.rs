@@ -3,8 +3,9 @@
 use super::beam_point::{BeamPoint, StressPlace, StressPoint};
 use super::columns::ColumnGroup;
 use super::place::Place;
-use crate::run::Snapshot;
+use crate::run::{Snapshot, WatchedColumns};
 use crate::system::Node;
+use std::sync::Arc;
 
 /// A group of columns of one object, with their names.
 #[derive(Clone)]
@@ -48,6 +49,19 @@ impl Probe {
             Reading::Contact(number, read) => read(*number, at, out),
             Reading::Whole(read) => read(at, out),
         }
+    }
+
+    /// The columns that dynamic stages watch, if it has some.
+    pub fn watched(&self) -> Option<WatchedColumns> {
+        let parts = self.group.parts.iter().scan(0, |end, part| {
+            let start = *end;
+            *end += part.suffixes.len().max(1);
+            Some((part.quantity, [start, *end]))
+        });
+        let vectors: Vec<_> = parts.filter_map(|(quantity, ends)| Some((quantity.ringing_kind()?, ends))).collect();
+        let probe = self.clone();
+        let read = Arc::new(move |at: &Snapshot, out: &mut Vec<f64>| probe.read(at, out));
+        (!vectors.is_empty()).then(|| WatchedColumns { names: self.names.clone(), vectors, read })
     }
 
     /// The place whose motion the columns show.

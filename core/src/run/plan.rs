@@ -1,9 +1,9 @@
 //! The plan of a run: the scene, and the stages in their order.
 
+use super::ringing::WatchedColumns;
 use super::snapshot::Snapshot;
 use crate::integrate::Scheme;
 use crate::model::{Model, StageContext, StageKind};
-use crate::probe::Probe;
 use crate::rotation::Rotation;
 use crate::system::{Node, State};
 use crate::tensor::Vec3;
@@ -23,8 +23,8 @@ pub struct Plan {
     pub interval: Option<f64>,
     /// The energy account is asked for.
     pub energy: bool,
-    /// The columns that are written: dynamic stages look at some of them
-    pub columns: Vec<Probe>,
+    /// The columns that are written and depend on accelerations
+    pub watched: Vec<WatchedColumns>,
     /// Somebody looks at continued rotation vectors.
     pub continued: bool,
     /// The initial places of all nodes, where a modal stage asks for them
@@ -40,7 +40,7 @@ impl Plan {
             stages,
             interval: None,
             energy: false,
-            columns: Vec::new(),
+            watched: Vec::new(),
             continued: false,
             places: Vec::new(),
         }

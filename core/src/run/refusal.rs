@@ -50,9 +50,7 @@ pub fn refusal(error: &StageError, model: &Model) -> String {
 /// A cure where stage number `stage` (from 0) cannot begin.
 pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<String> {
     let driven = |own_stages: Option<bool>| match own_stages {
-        None if stage == 0 => {
-            "a dynamic stage starts from the current state: give it a `history` that starts at 0".into()
-        }
+        None if stage == 0 => "a stage starts from the current state: give it a `history` that starts at 0".into(),
         None => "give it a `history` that starts at the current value".into(),
         Some(false) => format!(
             "a history is a function of the load factor in static stages and of time in dynamic ones: `history = {{ \
@@ -81,9 +79,9 @@ pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<S
     }
 }
 
-/// The cure where the first stage is dynamic.
+/// The cure where the first stage jumps.
 const START: &str =
-    "a dynamic stage starts from the current state: the history must start at 0, or a static stage must come before";
+    "a stage starts from the current state: the history must start at 0, or a static stage must come before";
 
 /// A displacement, or an angle in radians and degrees.
 fn size(value: f64, turns: bool) -> String {

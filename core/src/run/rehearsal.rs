@@ -188,6 +188,10 @@ impl<'p> Rehearser<'p> {
         if !kind.advances_time() {
             let load = self.state.load;
             self.schedule.set_clock(self.model, &mut self.state, clock, load);
+            if self.sure && kind.ramps_load() {
+                let leaps = self.model.motor_leaps(&amplitude, &self.state);
+                self.found.refusals.extend(leaps.into_iter().map(|leap| (number, StageError::MotorJump(leap))));
+            }
             if let StageWork::Static { steps, .. } = stage.work {
                 self.look_between_levels(number, steps);
             }

@@ -8,7 +8,7 @@ use crate::deck::{
 };
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
-use crate::scene::names::{self, unknown};
+use crate::scene::names::{self, unknown, unknown_beam};
 use crate::scene::path;
 use crate::scene::surfaces;
 use beamsim_core::effect::contact::{
@@ -261,7 +261,7 @@ impl Composer<'_> {
     /// A beam of contact number `own`.
     fn beam_named(&mut self, contact: &deck::Contact, name: &Spanned<String>, own: usize) -> Option<Strand> {
         let Some(number) = self.mesh.beams.number(&name.value) else {
-            self.report(unknown("beam", name, self.deck.beams.names()));
+            self.diagnostics.extend(unknown_beam(self.deck, name));
             return None;
         };
         let radius = self.radius(contact, name, Some(&self.mesh.beams[number]))?;

@@ -86,9 +86,7 @@ impl Composer<'_> {
         for load in &self.deck.loads {
             let LoadTarget::Along(along) = &load.target else { continue };
             let Some(beam) = self.mesh.beams.named(&along.value) else {
-                if self.deck.beams.number(&along.value).is_none() {
-                    self.diagnostics.push(names::unknown("beam", along, self.deck.beams.names()));
-                }
+                self.diagnostics.extend(names::unknown_beam(self.deck, along));
                 continue;
             };
             let Some(amplitude) = self.amplitude_of_load(load) else { continue };

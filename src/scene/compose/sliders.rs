@@ -2,7 +2,7 @@
 
 use super::{Composer, stage_set};
 use crate::deck::{self, Deck, Diagnostic, EffectWord, Sliding, Spanned, StageBody};
-use crate::scene::names::unknown;
+use crate::scene::names::unknown_beam;
 use beamsim_core::effect::sliding::{Guide, GuideNode, Slider, Sliders};
 use beamsim_core::model::{Amplitude, Motion, MotionKind, SlotKind, Support};
 use beamsim_core::run::Driven;
@@ -56,7 +56,7 @@ impl Composer<'_> {
     fn beam_number(&mut self, name: &Spanned<String>) -> Option<usize> {
         let found = self.mesh.beams.number(&name.value);
         if found.is_none() {
-            self.diagnostics.push(unknown("beam", name, self.deck.beams.names()));
+            self.diagnostics.extend(unknown_beam(self.deck, name));
         }
         found
     }

@@ -2,9 +2,9 @@
 
 use super::adaptive::Control;
 use super::friction_impulses::FrictionImpulses;
-use super::ringing::Ringing;
 use crate::integrate::Predictor;
 use crate::run::energy::EnergyGuard;
+use crate::run::ringing::Ringing;
 use serde::{Deserialize, Serialize};
 
 /// A dynamic stage between two rows.

@@ -1,13 +1,14 @@
 //! Judgement of a dynamic stage: the energy that its steps have made or lost, and their estimated
 //! error.
 
-use super::Dynamics;
-use crate::effect::TOLD_PENETRATION;
+use super::{Dynamics, TOLERATED_STRAIN};
+use crate::effect::{RoundOff, TOLD_PENETRATION};
 use crate::integrate::{Largest, Rotations, Stages, StepEnds};
 use crate::model::Model;
 use crate::run::energy::Imbalance;
 use crate::run::findings::StageTimeError;
 use crate::run::plan::TimeStepping;
+use crate::run::ringing::{RingingKind, Worst};
 use crate::run::stage_run::StageRun;
 use crate::system::StageKind;
 use crate::warning::WarningKind;
@@ -27,6 +28,8 @@ const STANDING_STILL: f64 = 1e-6;
 /// The part of the impulse of friction missed within steps that is told: of blocks on random belts those below
 /// it are up to 8 % off.
 const TOLD_FRICTION: f64 = 0.01;
+/// An oscillation that steps do not resolve is told if it is larger than this part of the largest value of a column.
+const TOLD_RINGING: f64 = 0.05;
 /// The error that a step is proposed for, over the one that is told.
 const PROPOSED_ERROR: f64 = 0.4;
 /// The least part of a step that is proposed where another scheme does with the step as it is.
@@ -122,6 +125,48 @@ impl Dynamics<'_, '_> {
         }
     }
 
+    /// Forces and accelerations that steps do not resolve.
+    pub(super) fn warn_of_ringing(&mut self) {
+        let worst = self.ringing.worst(&self.stage.plan.watched, |kind| self.tolerated(kind));
+        let Some(Worst { names, share, time }) = worst.filter(|worst| worst.share > TOLD_RINGING) else { return };
+        let columns = match names {
+            [only] => format!("`{only}`"),
+            [first, .., last] => format!("`{first}` … `{last}`"),
+            [] => return,
+        };
+        let advice = if self.settings.scheme.dissipates() {
+            "a smaller `step` resolves them, more dissipation damps them"
+        } else {
+            "`scheme = \"hht\"` damps them, a smaller `step` resolves them"
+        };
+        let message = format!(
+            "stage {}: forces and accelerations oscillate faster than the time steps resolve, those of {columns} by {} of \
+             their largest value (about time {}); displacements may be right ({advice})",
+            self.stage.number + 1,
+            percent(share),
+            two_digits(time)
+        );
+        self.stage.warn(WarningKind::Ringing, message);
+    }
+
+    /// What Newton's method may leave in columns that are zero.
+    fn tolerated(&self, kind: RingingKind) -> f64 {
+        let StageRun { assembly, model, state, .. } = &*self.stage;
+        let step = self.ringing.step();
+        // The forces and moments of a strain of one
+        let RoundOff { force, moment } = assembly.round_off(state);
+        let [force, moment] = [force, moment].map(|round_off| round_off / f64::EPSILON);
+        TOLERATED_STRAIN
+            * match kind {
+                RingingKind::Acceleration => 4.0 * model.length / (step * step),
+                RingingKind::AngularAcceleration => 4.0 / (step * step),
+                RingingKind::Force => force,
+                RingingKind::Moment => moment,
+                RingingKind::Strain => 1.0,
+                RingingKind::Curvature => 1.0 / model.length,
+            }
+    }
+
     /// Notes the estimated errors of fixed steps, and warns of steps that are too long.
     pub(super) fn judge_steps(&mut self) {
         let StageRun { assembly, newton, good, state, counters, issued, number, .. } = &mut *self.stage;
@@ -213,7 +258,7 @@ impl Excess {
 }
 
 /// A share, of which more than the whole tells nothing.
-pub(super) fn percent(share: f64) -> String {
+fn percent(share: f64) -> String {
     if share < 1.0 { format!("{:.0} %", 100.0 * share) } else { "100 % or more".into() }
 }
 

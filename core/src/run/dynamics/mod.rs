@@ -9,7 +9,6 @@ mod judgement;
 mod massless;
 mod massless_start;
 mod middle;
-mod ringing;
 mod smooth_start;
 mod start;
 mod two_stages;
@@ -19,11 +18,11 @@ use self::checkpoint::{DynamicsCheckpoint, StepsCheckpoint};
 use self::friction_impulses::FrictionImpulses;
 use self::grid::Grid;
 use self::middle::Middle;
-use self::ringing::Ringing;
 use super::checkpoint::AnalysisCheckpoint;
 use super::energy::{EnergyGuard, Growth};
 use super::failure::Failure;
 use super::plan::TimeStepping;
+use super::ringing::Ringing;
 use super::stage_run::{Analysis, StageRun};
 use crate::integrate::{Increments, Predictor, Rotations, Step, StepEnds, TimeError};
 use crate::kernel::Weights;
@@ -478,7 +477,9 @@ impl Dynamics<'_, '_> {
         self.stage.accept()?;
         self.stage.counters.steps += 1;
         self.stage.show()?;
-        self.ringing.take(self.stage, step.length);
+        if !self.stage.plan.watched.is_empty() {
+            self.ringing.take(&self.stage.plan.watched, &self.stage.snapshot(), step.length);
+        }
         self.refuse_growth()?;
         if self.stage.is_over() {
             return Ok(true);

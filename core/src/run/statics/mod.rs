@@ -21,7 +21,7 @@ use super::failure::Failure;
 use super::spatial::SpatialLook;
 use super::stage_run::StageRun;
 use crate::kernel::Weights;
-use crate::model::charts;
+use crate::model::{StageError, charts};
 use crate::solve::{SoftMode, Tangent};
 use crate::warning::WarningKind;
 
@@ -32,7 +32,7 @@ const MOST_KEPT_VALUES: usize = 10_000_000;
 /// Puts the stage at rest, at load factor 0. What nothing holds as long as nothing is loaded is
 /// named: levels may bring what holds it.
 fn begin(stage: &mut StageRun, space: &mut SpatialLook) -> Result<Option<Failure>, Failure> {
-    unload(stage);
+    unload(stage)?;
     stage.refuse_penetration()?;
     stage.take_over();
     stage.linearise()?;
@@ -56,16 +56,20 @@ fn begin(stage: &mut StageRun, space: &mut SpatialLook) -> Result<Option<Failure
     Ok(loose)
 }
 
-/// No velocities, and no load that grows.
-fn unload(stage: &mut StageRun) {
+/// No velocities, and no load that grows. Motors must not leap.
+fn unload(stage: &mut StageRun) -> Result<(), Failure> {
     let StageRun { model, state, schedule, charted, .. } = stage;
     state.stand_still();
-    let time = state.time;
+    let (time, amplitude) = (state.time, state.amplitude.clone());
     let held = state.q.clone();
     schedule.set_clock(model, state, time, 0.0);
     state.q = held;
+    if let Some(leap) = model.motor_leaps(&amplitude, state).into_iter().next() {
+        return Err(stage.describe(StageError::MotorJump(leap)));
+    }
     charts::switch(state, &charted.rotations, charts::STATIC_BAND, None);
     charts::freeze(state, &charted.elements);
+    Ok(())
 }
 
 /// The softest motion of the stiffness, which is formed. It stays beside its factors, since the
