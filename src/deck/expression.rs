@@ -45,7 +45,8 @@ impl ExpressionError {
     pub fn diagnostic(&self, text: &str, span: &Span) -> Diagnostic {
         let at = span.start + 1 + self.offset;
         let message = format!("in the expression `{}`: {}", shortened(text), self.message);
-        let found = text.get(self.offset..).and_then(|rest| rest.chars().next());
+        let is_behind_number = text.get(..self.offset).is_some_and(|before| before.trim_end().ends_with(is_of_number));
+        let found = text.get(self.offset..).and_then(|rest| rest.chars().next()).filter(|_| is_behind_number);
         let help = found.filter(|c| self.message == unexpected(*c)).and_then(help_behind_number);
         Diagnostic { help: help.map(String::from), ..Diagnostic::error(message, at..at + 1) }
     }
@@ -54,13 +55,17 @@ impl ExpressionError {
 /// What helps where this character stands behind a number.
 pub fn help_behind_number(found: char) -> Option<&'static str> {
     match found {
-        ',' => Some("decimals stand behind a point: 1.5"),
+        ',' => Some("write decimals with a point: 1.5"),
         c if c.is_alphabetic() || "°%[".contains(c) => Some(
             "numbers have no units: all are in one consistent system, angles in rad (\"30*deg\" is an expression); operators \
              are + - * / ^",
         ),
         _ => None,
     }
+}
+
+fn is_of_number(c: char) -> bool {
+    c.is_ascii_digit() || c == '.'
 }
 
 /// The message about a character that cannot stand there.

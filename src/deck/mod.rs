@@ -262,7 +262,11 @@ fn help_of_number(text: &str, place: usize) -> Option<&'static str> {
     if number.starts_with('.') || number.ends_with('.') {
         return Some("digits stand on both sides of the point: 0.4, 5.0");
     }
-    behind.trim_start_matches([' ', '\t']).chars().next().filter(|_| !number.is_empty()).and_then(help_behind_number)
+    let found = behind.trim_start_matches([' ', '\t']).chars().next()?;
+    // A comma before another value separates, and a word before `=` is a key.
+    let separates = found == ',' && !behind[1..].starts_with(|c: char| c.is_ascii_digit());
+    let is_key = behind.split(['\n', ',', '}', '#']).next().is_some_and(|rest| rest.contains('='));
+    if number.is_empty() || separates || is_key { None } else { help_behind_number(found) }
 }
 
 /// The place of the key with the most dots.

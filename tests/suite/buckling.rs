@@ -372,8 +372,8 @@ fn shafts_buckle_under_the_torque_that_twists_them() {
 #[test]
 fn rings_of_unequal_arcs_buckle_under_following_pressure() {
     let mut random = Random::new(118);
-    // The share of the first arc, elements of both, and the pressure of the static stage over EI/R^3. From near by the imaginary
-    // part of the pair of the last ring is not small beside the distance.
+    // The share of the first arc, elements of both, and the pressure of the static stage over EI/R^3. Near the loads of the last
+    // ring the distances to them have imaginary parts of more than a thousandth.
     let rings = [
         (0.5, [20, 24], random.range(0.2, 2.5)),
         (0.5, [40, 57], random.range(0.2, 2.5)),

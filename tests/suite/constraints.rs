@@ -89,7 +89,7 @@ fn negative_pivots_are_negative_eigenvalues_between_constraints() {
 }
 
 /// Bars tied by joints of all kinds, in units of length that are powers of two: digits of corrections do not depend on them, so
-/// what is put beside multipliers does not either.
+/// weights of multipliers do not either.
 #[test]
 fn corrections_have_the_same_digits_in_every_unit_of_length() {
     let correction = |kind: &str, unit: f64, seed: u64| {

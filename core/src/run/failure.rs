@@ -257,14 +257,14 @@ impl Failure {
 
 impl fmt::Display for Moment {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "stage {}, time {}, load factor {}", self.stage, Clock(self.time), Clock(self.load))
+        write!(f, "stage {}, time {}, load factor {}", self.stage, ShortNumber(self.time), ShortNumber(self.load))
     }
 }
 
 /// A time or load factor in a message: with an exponent where that spares many zeros.
-pub(super) struct Clock(pub f64);
+pub(super) struct ShortNumber(pub f64);
 
-impl fmt::Display for Clock {
+impl fmt::Display for ShortNumber {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let size = self.0.abs();
         if size == 0.0 || (1e-6..1e15).contains(&size) { write!(f, "{}", self.0) } else { write!(f, "{:e}", self.0) }
@@ -320,9 +320,10 @@ impl fmt::Display for Failure {
             }
             Self::LimitPoint { at, goal, increments, end } => write!(
                 f,
-                "load factor {goal} was not reached: load control stopped at {at}; the equilibrium path was then \
+                "load factor {} was not reached: load control stopped at {at}; the equilibrium path was then \
                  followed by {increments} arc-length increments, to load factor {}",
-                Clock(end.load)
+                ShortNumber(*goal),
+                ShortNumber(end.load)
             ),
             Self::StepTooSmall { at, place, error, share } => write!(
                 f,

@@ -1,6 +1,6 @@
 //! Results of analyses: modes, critical loads, special points of equilibrium paths.
 
-use super::failure::{Clock, Moment};
+use super::failure::{Moment, ShortNumber};
 use crate::warning::WarningKind;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -119,7 +119,7 @@ impl EventKind {
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Moment { stage, load, .. } = self.at;
-        write!(f, "{} in stage {stage} at load factor {}", self.kind.name(), Clock(load))?;
+        write!(f, "{} in stage {stage} at load factor {}", self.kind.name(), ShortNumber(load))?;
         match self.negative_pivots {
             None => Ok(()),
             Some(0) => f.write_str(": stable after it"),

@@ -3,12 +3,13 @@
 
 use super::{Dynamics, TOLERATED_STRAIN};
 use crate::effect::{RoundOff, TOLD_PENETRATION};
-use crate::integrate::{Largest, Rotations, Stages, StepEnds};
+use crate::integrate::{Largest, Rotations, Scheme, Stages, StepEnds};
 use crate::model::Model;
 use crate::run::energy::Imbalance;
+use crate::run::failure::ShortNumber;
 use crate::run::findings::StageTimeError;
 use crate::run::plan::TimeStepping;
-use crate::run::ringing::{RingingKind, Worst};
+use crate::run::ringing::{RingingKind, WorstOscillation};
 use crate::run::stage_run::StageRun;
 use crate::system::StageKind;
 use crate::warning::WarningKind;
@@ -127,44 +128,56 @@ impl Dynamics<'_, '_> {
 
     /// Forces and accelerations that steps do not resolve.
     pub(super) fn warn_of_ringing(&mut self) {
-        let worst = self.ringing.worst(&self.stage.plan.watched, |kind| self.tolerated(kind));
-        let Some(Worst { names, share, time }) = worst.filter(|worst| worst.share > TOLD_RINGING) else { return };
+        let worst = self.ringing.worst(&self.stage.plan.watched, self.round_off_of_columns());
+        let Some(WorstOscillation { names, share, time }) = worst.filter(|worst| worst.share > TOLD_RINGING) else {
+            return;
+        };
         let columns = match names {
             [only] => format!("`{only}`"),
             [first, .., last] => format!("`{first}` … `{last}`"),
             [] => return,
         };
-        let advice = if self.settings.scheme.dissipates() {
-            "a smaller `step` resolves them, more dissipation damps them"
-        } else {
-            "`scheme = \"hht\"` damps them, a smaller `step` resolves them"
+        let Scheme { stages, rotations, .. } = self.settings.scheme;
+        let advice = match (stages, rotations, self.settings.scheme.dissipates()) {
+            (Stages::MiddleAndEnd, _, _) => "try a smaller `step`",
+            (Stages::End, _, true) => "try a smaller `step`, or a smaller `rho_inf` of `generalized_alpha`",
+            (Stages::End, Rotations::Increments, false) => "try `rho_inf = 0.5`, or a smaller `step`",
+            (Stages::End, Rotations::Totals, false) => {
+                "try `scheme = \"generalized_alpha\"` with `rho_inf = 0.5`, or a smaller `step`"
+            }
         };
         let message = format!(
-            "stage {}: forces and accelerations oscillate faster than the time steps resolve, those of {columns} by {} of \
-             their largest value (about time {}); displacements may be right ({advice})",
+            "stage {}: forces or accelerations oscillate faster than the time steps resolve, those of {columns} by {} of \
+             their largest value, or more (until time {}); displacements may be right ({advice})",
             self.stage.number + 1,
             percent(share),
-            two_digits(time)
+            ShortNumber(time)
         );
         self.stage.warn(WarningKind::Ringing, message);
     }
 
-    /// What Newton's method may leave in columns that are zero.
-    fn tolerated(&self, kind: RingingKind) -> f64 {
-        let StageRun { assembly, model, state, .. } = &*self.stage;
-        let step = self.ringing.step();
+    /// Columns of each kind up to these values may be no more than the residual of Newton's method.
+    fn round_off_of_columns(&self) -> [f64; RingingKind::ALL.len()] {
+        let StageRun { assembly, model, state, bookkeeper, plan, .. } = &*self.stage;
+        let (length, step) = (model.length, self.settings.step);
+        let largest = self.ringing.largest(&plan.watched);
         // The forces and moments of a strain of one
         let RoundOff { force, moment } = assembly.round_off(state);
         let [force, moment] = [force, moment].map(|round_off| round_off / f64::EPSILON);
-        TOLERATED_STRAIN
-            * match kind {
-                RingingKind::Acceleration => 4.0 * model.length / (step * step),
-                RingingKind::AngularAcceleration => 4.0 / (step * step),
-                RingingKind::Force => force,
-                RingingKind::Moment => moment,
-                RingingKind::Strain => 1.0,
-                RingingKind::Curvature => 1.0 / model.length,
-            }
+        let of_energy = bookkeeper.scale();
+        RingingKind::ALL.map(|kind| {
+            TOLERATED_STRAIN
+                * match kind {
+                    RingingKind::Acceleration => 4.0 * length / (step * step),
+                    RingingKind::AngularAcceleration => 4.0 / (step * step),
+                    RingingKind::Force => {
+                        force.max(of_energy / length).max(largest[RingingKind::Moment as usize] / length)
+                    }
+                    RingingKind::Moment => moment.max(of_energy).max(largest[RingingKind::Force as usize] * length),
+                    RingingKind::Strain => 1.0,
+                    RingingKind::Curvature => 1.0 / length,
+                }
+        })
     }
 
     /// Notes the estimated errors of fixed steps, and warns of steps that are too long.

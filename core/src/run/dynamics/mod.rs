@@ -477,15 +477,21 @@ impl Dynamics<'_, '_> {
         self.stage.accept()?;
         self.stage.counters.steps += 1;
         self.stage.show()?;
-        if !self.stage.plan.watched.is_empty() {
-            self.ringing.take(&self.stage.plan.watched, &self.stage.snapshot(), step.length);
-        }
+        self.follow_ringing();
         self.refuse_growth()?;
         if self.stage.is_over() {
             return Ok(true);
         }
         self.settle_charts(step);
         Ok(false)
+    }
+
+    /// Steps that adapt to their error have no even distances.
+    fn follow_ringing(&mut self) {
+        let watched = &self.stage.plan.watched;
+        if !watched.is_empty() && self.settings.adaptive.is_none() {
+            self.ringing.take(watched, &self.stage.snapshot());
+        }
     }
 
     /// A scheme that makes energy from nothing ends the run while its results can still be told
