@@ -43,6 +43,6 @@ pub use plan::{Approach, InitialMotion, Plan, Stage, StageWork, TimeStepping, Un
 pub use refusal::{refusal, refusal_help};
 pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use results::{CriticalKind, CriticalLoad, Event, EventKind, Mode, StageResult};
-pub use ringing::{RingingKind, WatchedColumns};
+pub use ringing::{ReadColumns, RingingKind, WatchedColumns};
 pub use sequence::Run;
 pub use snapshot::{ContactCounters, Counters, Snapshot};

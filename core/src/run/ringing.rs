@@ -52,6 +52,9 @@ impl RingingKind {
         [Self::Acceleration, Self::AngularAcceleration, Self::Force, Self::Moment, Self::Strain, Self::Curvature];
 }
 
+/// Appends the values of columns.
+pub type ReadColumns = dyn Fn(&Snapshot, &mut Vec<f64>) + Send + Sync;
+
 /// Columns that depend on accelerations, with the function that appends their values, and others beside them.
 #[derive(Clone)]
 pub struct WatchedColumns {
@@ -60,7 +63,7 @@ pub struct WatchedColumns {
     /// Which of them are watched, vector by vector: the first, and the first behind them
     pub vectors: Vec<(RingingKind, [usize; 2])>,
     /// Appends the values
-    pub read: Arc<dyn Fn(&Snapshot, &mut Vec<f64>) + Send + Sync>,
+    pub read: Arc<ReadColumns>,
 }
 
 /// Follows the watched columns of a run over a stage of fixed steps.
