@@ -178,14 +178,15 @@ impl Signal {
             self.differences.pop_front();
         }
         self.differences.push_back(difference);
+        if self.differences.len() < WINDOW {
+            return;
+        }
         let mut sorted = [0.0; WINDOW];
-        if self.differences.len() == WINDOW {
-            sorted.iter_mut().zip(&self.differences).for_each(|(sorted, &difference)| *sorted = difference);
-            let (_, &mut median, _) = sorted.select_nth_unstable_by(WINDOW / 2, f64::total_cmp);
-            if median > self.oscillation {
-                self.oscillation = median;
-                self.time = time;
-            }
+        sorted.iter_mut().zip(&self.differences).for_each(|(sorted, &difference)| *sorted = difference);
+        let (_, &mut median, _) = sorted.select_nth_unstable_by(WINDOW / 2, f64::total_cmp);
+        if median > self.oscillation {
+            self.oscillation = median;
+            self.time = time;
         }
     }
 }

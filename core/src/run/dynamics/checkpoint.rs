@@ -20,6 +20,7 @@ pub(in crate::run) struct DynamicsCheckpoint {
     pub(super) guard: Option<EnergyGuard>,
     /// The friction of fixed steps
     pub(super) friction: FrictionImpulses,
+    /// Columns that depend on accelerations
     pub(super) ringing: Ringing,
     pub(super) steps: StepsCheckpoint,
 }
